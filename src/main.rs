@@ -1,0 +1,3 @@
+//! The `etendue` command.
+
+fn main() {}
