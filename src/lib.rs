@@ -4,6 +4,8 @@
 
 pub mod error;
 
+pub mod color;
+
 pub mod description;
 pub mod image;
 pub mod mesh;
