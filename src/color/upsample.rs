@@ -33,7 +33,7 @@ impl Sigmoid {
     #[inline]
     pub fn eval(&self, lambda: f32) -> f32 {
         let [c0, c1, c2] = self.c;
-        sigmoid((c0 * lambda + c1) * lambda + c2)
+        sigmoid((c0 * lambda + c1) * lambda + c2).0
     }
 
     /// From the coefficients of t², t and 1, where t runs from −1 to 1 over the visible range.
@@ -51,12 +51,14 @@ impl Sigmoid {
     }
 }
 
-/// ½ + ½·v/√(1 + v²), written so that small values keep their digits and infinite v gives exactly 0 or 1.
+/// ½ + ½·v/√(1 + v²) and its derivative, written so that small values keep their digits and infinite v
+/// gives exactly 0 or 1.
 #[inline]
-fn sigmoid(v: f32) -> f32 {
+fn sigmoid(v: f32) -> (f32, f32) {
     let root = (1.0 + v * v).sqrt();
     let tail = 0.5 / (root * (root + v.abs()));
-    if v < 0.0 { tail } else { 1.0 - tail }
+    let value = if v < 0.0 { tail } else { 1.0 - tail };
+    (value, 0.5 / (root * root * root))
 }
 
 /// `value` clamped to [0, 1]; NaN is 0.
@@ -130,11 +132,7 @@ impl Observer {
         let mut slope = [[[0f32; LANES]; 3]; 3];
         for Group { t, rgb } in &self.groups {
             for l in 0..LANES {
-                let v = (a0 * t[l] + a1) * t[l] + a2;
-                let root = (1.0 + v * v).sqrt();
-                let tail = 0.5 / (root * (root + v.abs()));
-                let s = if v < 0.0 { tail } else { 1.0 - tail };
-                let ds = 0.5 / (root * root * root);
+                let (s, ds) = sigmoid((a0 * t[l] + a1) * t[l] + a2);
                 for c in 0..3 {
                     let weight = rgb[c][l];
                     value[c][l] += weight * s;
