@@ -1,1 +1,286 @@
-//! (being written)
+//! The scene file as it was written: Mitsuba 3's XML becomes a flat list of nodes, each a plugin's kind,
+//! type, id and located properties, with parameters, includes, references and versions already dealt
+//! with. Nothing here knows what a plugin is; the families read their properties through
+//! [`Properties`], which remembers what was asked for, so that what nobody read can be reported.
+
+pub mod properties;
+
+mod defines;
+mod element;
+mod reader;
+mod resolve;
+mod transform;
+mod upgrade;
+mod values;
+mod xml;
+
+#[cfg(test)]
+mod tests;
+
+use std::collections::BTreeSet;
+use std::fmt;
+use std::path::Path;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use glam::{DMat4, DVec3};
+
+pub use self::properties::Properties;
+use self::reader::Reader;
+use self::resolve::Scopes;
+use crate::error::{Error, Location, Problem, Result};
+
+/// A node's place in its [`Description`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct NodeId(u32);
+
+impl NodeId {
+    const ROOT: Self = Self(0);
+
+    fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+/// What sort of plugin a node describes; each has its own XML tag.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[expect(missing_docs, reason = "each variant is named like its tag")]
+pub enum Kind {
+    Scene,
+    Integrator,
+    Sensor,
+    Film,
+    Filter,
+    Sampler,
+    Shape,
+    Bsdf,
+    Texture,
+    Emitter,
+    Medium,
+    Phase,
+    Volume,
+    Spectrum,
+}
+
+impl Kind {
+    /// Every kind, in the order of their declaration.
+    pub const ALL: [Self; 14] = [
+        Self::Scene,
+        Self::Integrator,
+        Self::Sensor,
+        Self::Film,
+        Self::Filter,
+        Self::Sampler,
+        Self::Shape,
+        Self::Bsdf,
+        Self::Texture,
+        Self::Emitter,
+        Self::Medium,
+        Self::Phase,
+        Self::Volume,
+        Self::Spectrum,
+    ];
+
+    /// The XML tag.
+    pub fn tag(self) -> &'static str {
+        match self {
+            Self::Scene => "scene",
+            Self::Integrator => "integrator",
+            Self::Sensor => "sensor",
+            Self::Film => "film",
+            Self::Filter => "rfilter",
+            Self::Sampler => "sampler",
+            Self::Shape => "shape",
+            Self::Bsdf => "bsdf",
+            Self::Texture => "texture",
+            Self::Emitter => "emitter",
+            Self::Medium => "medium",
+            Self::Phase => "phase",
+            Self::Volume => "volume",
+            Self::Spectrum => "spectrum",
+        }
+    }
+
+    fn of_tag(tag: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| kind.tag() == tag)
+    }
+}
+
+impl fmt::Display for Kind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.tag())
+    }
+}
+
+/// What a property holds. Numbers are finite.
+#[derive(Clone, Debug)]
+pub enum Value {
+    /// `<boolean>`
+    Boolean(bool),
+    /// `<integer>`
+    Integer(i64),
+    /// `<float>`
+    Float(f64),
+    /// `<string>`
+    String(String),
+    /// `<point>` or `<vector>`
+    Vector(DVec3),
+    /// `<rgb>`: linear sRGB, unbounded.
+    Rgb(DVec3),
+    /// `<spectrum>` without a type.
+    Spectrum(Spectrum),
+    /// `<transform>`: affine and invertible, for column vectors.
+    Transform(DMat4),
+    /// `<animation>`: at least one (time, transform), times strictly increasing, transforms as above.
+    Animation(Vec<(f64, DMat4)>),
+    /// A nested plugin or a reference to one.
+    Object(NodeId),
+}
+
+/// What a `<spectrum>` tag says.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Spectrum {
+    /// The same value at every wavelength.
+    Uniform(f64),
+    /// (Wavelength in nm, value), at least two, wavelengths positive and strictly increasing.
+    Curve(Vec<(f64, f64)>),
+}
+
+/// One property of a node.
+#[derive(Debug)]
+pub struct Property {
+    /// Its name; empty for a nested plugin without one.
+    pub name: String,
+    /// What it holds.
+    pub value: Value,
+    /// Where its tag stands.
+    pub location: Location,
+    /// The folders that a file named by it is looked for in.
+    scope: u32,
+    read: AtomicBool,
+}
+
+impl Property {
+    fn new(name: &str, value: Value, location: Location, scope: u32) -> Self {
+        Self {
+            name: name.to_owned(),
+            value,
+            location,
+            scope,
+            read: AtomicBool::new(false),
+        }
+    }
+
+    /// Notes that somebody made use of it.
+    pub fn mark_read(&self) {
+        self.read.store(true, Ordering::Relaxed);
+    }
+}
+
+/// One plugin's description.
+#[derive(Debug)]
+struct Node {
+    kind: Kind,
+    plugin: String,
+    id: Option<String>,
+    location: Location,
+    /// In file order.
+    properties: Vec<Property>,
+    /// The names that were asked for, to suggest one of them for a misspelt property.
+    asked: Mutex<BTreeSet<&'static str>>,
+    /// Whether anything was asked, be it by name or by kind.
+    visited: AtomicBool,
+}
+
+/// How a scene file is to be read.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// Values for the file's `$name` parameters, as `-D name=value` gives them; a later one wins.
+    pub defines: Vec<(String, String)>,
+    /// Whether what Mitsuba 3 does not read (keyframes, `#rrggbb`, `<lookAt>`) is an error.
+    pub strict: bool,
+}
+
+/// A scene file with everything it includes, as a flat list of nodes.
+#[derive(Debug)]
+pub struct Description {
+    nodes: Vec<Node>,
+    scopes: Scopes,
+    warnings: Vec<Problem>,
+}
+
+impl Description {
+    /// Reads the scene file at `path`.
+    ///
+    /// # Errors
+    /// Names every place in the file, or in one it includes, that says something wrong; an XML syntax error alone
+    /// ends the search at once.
+    pub fn read(path: &Path, options: &Options) -> Result<Self> {
+        Self::parse(&xml::read_text(path)?, path, options)
+    }
+
+    /// Reads a scene from `text`. Messages name `path`, and its folder is the base of relative file names.
+    ///
+    /// # Errors
+    /// As [`Description::read`].
+    pub fn parse(text: &str, path: &Path, options: &Options) -> Result<Self> {
+        Reader::new(options).scene(text, path)
+    }
+
+    /// The scene itself.
+    pub fn root(&self) -> Properties<'_> {
+        self.node(NodeId::ROOT)
+    }
+
+    /// The node called `id`, which must be of this description.
+    pub fn node(&self, id: NodeId) -> Properties<'_> {
+        Properties::new(self, id)
+    }
+
+    /// Things that are right but worth knowing, such as an upgrade from an older version of the format.
+    pub fn warnings(&self) -> &[Problem] {
+        &self.warnings
+    }
+
+    /// Every property and nested plugin that nobody has read, of the nodes that were asked for anything at all.
+    /// Plugins at the top of the scene that carry an id are no problem: they may be there to be referred to.
+    pub fn unread(&self) -> Vec<Problem> {
+        let mut problems = Vec::new();
+        for (index, node) in self.nodes.iter().enumerate() {
+            if !node.visited.load(Ordering::Relaxed) {
+                continue;
+            }
+            for property in &node.properties {
+                let referable = index == NodeId::ROOT.index() && self.has_id(property);
+                if !property.read.load(Ordering::Relaxed) && !referable {
+                    problems.extend_from_slice(self.unread_property(node, property).problems());
+                }
+            }
+        }
+        problems
+    }
+
+    fn has_id(&self, property: &Property) -> bool {
+        matches!(property.value, Value::Object(id) if self.nodes[id.index()].id.is_some())
+    }
+
+    fn unread_property(&self, node: &Node, property: &Property) -> Error {
+        let Node { kind, plugin, .. } = node;
+        let name = property.name.as_str();
+        match property.value {
+            Value::Object(id) if name.is_empty() => {
+                let child = &self.nodes[id.index()];
+                Error::input(format!(
+                    "{kind} {plugin:?} has no use for the {} {:?}",
+                    child.kind, child.plugin
+                ))
+            }
+            _ => {
+                let asked = node.asked.lock().unwrap_or_else(|e| e.into_inner());
+                Error::input(format!("{kind} {plugin:?} has no property {name:?}"))
+                    .suggest(name, asked.iter().copied())
+            }
+        }
+        .at(&property.location)
+    }
+}

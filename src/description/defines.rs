@@ -1,0 +1,207 @@
+//! Parameters: `$name` inside an attribute stands for the value given by `-D name=value` or else by
+//! `<default name="name" value="…"/>` further up in the file. Where several names fit the longest is
+//! meant, and `\$` is a plain dollar sign.
+
+use std::borrow::Cow;
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Bound;
+
+use crate::error::{Error, Problems, Result};
+
+/// Bytes that all substitutions of a scene together may write.
+const MAX_SUBSTITUTED: usize = 64 << 20;
+
+#[derive(Debug, Default)]
+pub(super) struct Defines {
+    values: BTreeMap<String, Define>,
+    /// Names that the file gives a default or asks for.
+    known: BTreeSet<String>,
+    substituted: usize,
+}
+
+#[derive(Debug)]
+struct Define {
+    value: String,
+    /// Whether it came from the command line.
+    given: bool,
+    used: bool,
+}
+
+impl Defines {
+    pub(super) fn new(given: &[(String, String)]) -> Self {
+        let values = given.iter().map(|(name, value)| {
+            let define = Define {
+                value: value.clone(),
+                given: true,
+                used: false,
+            };
+            (name.clone(), define)
+        });
+        Self {
+            values: values.collect(),
+            ..Self::default()
+        }
+    }
+
+    /// What a `<default>` says; it never overrides.
+    pub(super) fn set_default(&mut self, name: &str, value: &str) {
+        self.known.insert(name.to_owned());
+        self.values
+            .entry(name.to_owned())
+            .or_insert_with(|| Define {
+                value: value.to_owned(),
+                given: false,
+                used: false,
+            });
+    }
+
+    /// `text` with every parameter replaced; what is put in is not looked at again.
+    pub(super) fn substitute<'t>(&mut self, text: &'t str) -> Result<Cow<'t, str>> {
+        if !text.contains('$') {
+            return Ok(Cow::Borrowed(text));
+        }
+        let mut out = String::new();
+        let mut rest = text;
+        while let Some(dollar) = rest.find('$') {
+            let (before, after) = (&rest[..dollar], &rest[dollar + 1..]);
+            if let Some(before) = before.strip_suffix('\\') {
+                out.push_str(before);
+                out.push('$');
+                rest = after;
+                continue;
+            }
+            out.push_str(before);
+            let Some(name) = self.longest_name(after) else {
+                self.known.insert(leading_name(after).to_owned());
+                return Err(self.undefined(after));
+            };
+            rest = &after[name.len()..];
+            if let Some(define) = self.values.get_mut(&name) {
+                define.used = true;
+                out.push_str(&define.value);
+                self.substituted += define.value.len();
+            }
+            if self.substituted > MAX_SUBSTITUTED {
+                return Err(Error::input(format!(
+                    "the parameters' values fill more than {} MiB",
+                    MAX_SUBSTITUTED >> 20
+                )));
+            }
+        }
+        out.push_str(rest);
+        Ok(Cow::Owned(out))
+    }
+
+    /// Notes the command line's parameters that nothing used.
+    pub(super) fn report_unused(&self, problems: &mut Problems) {
+        for (name, define) in &self.values {
+            if define.given && !define.used {
+                let mistaken = self.known.iter().map(String::as_str).filter(|&n| n != name);
+                problems.push(
+                    Error::input(format!(
+                        "the scene has no parameter ${name} to be set by -D"
+                    ))
+                    .suggest(name, mistaken),
+                );
+            }
+        }
+    }
+
+    /// The longest defined name that `text` starts with.
+    fn longest_name(&self, text: &str) -> Option<String> {
+        let mut prefix = text;
+        loop {
+            // In sorted order nothing stands between a name and the texts it begins but longer names.
+            let (name, _) = self
+                .values
+                .range::<str, _>((Bound::Unbounded, Bound::Included(prefix)))
+                .next_back()?;
+            if !name.is_empty() && prefix.starts_with(name.as_str()) {
+                return Some(name.clone());
+            }
+            prefix = common_prefix(prefix, name);
+            if prefix.is_empty() {
+                return None;
+            }
+        }
+    }
+
+    fn undefined(&self, after: &str) -> Error {
+        let name = leading_name(after);
+        if name.is_empty() {
+            return Error::input("no name after $; write \\$ for a dollar sign");
+        }
+        Error::input(format!("undefined parameter ${name}"))
+            .suggest(name, self.values.keys().map(String::as_str))
+            .help("give it by -D or by a <default> above this line")
+    }
+}
+
+fn leading_name(text: &str) -> &str {
+    let end = text.find(|c: char| !(c.is_alphanumeric() || c == '_'));
+    &text[..end.unwrap_or(text.len())]
+}
+
+fn common_prefix<'t>(a: &'t str, b: &str) -> &'t str {
+    let end = a
+        .char_indices()
+        .zip(b.chars())
+        .find(|&((_, x), y)| x != y)
+        .map_or(a.len().min(b.len()), |((i, _), _)| i);
+    &a[..end]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn defines(names: &[&str]) -> Defines {
+        let given: Vec<_> = names
+            .iter()
+            .map(|n| ((*n).to_owned(), format!("<{n}>")))
+            .collect();
+        Defines::new(&given)
+    }
+
+    #[test]
+    fn the_longest_name_that_fits_is_meant() {
+        let mut d = defines(&["res", "resx", "resolution", "r", "été"]);
+        for (text, expected) in [
+            ("$resx", "<resx>"),
+            ("$resy", "<res>y"),
+            ("$resolute", "<res>olute"),
+            ("$rest$r", "<res>t<r>"),
+            ("a$été.png", "a<été>.png"),
+            ("\\$res and $res", "$res and <res>"),
+            ("no parameter", "no parameter"),
+        ] {
+            assert_eq!(d.substitute(text).unwrap(), expected);
+        }
+        assert!(d.substitute("$q").is_err());
+        assert!(d.substitute("5 $ and more").is_err());
+    }
+
+    #[test]
+    fn a_default_does_not_override_and_an_unused_parameter_is_named() {
+        let mut d = defines(&["spp", "ssp"]);
+        d.set_default("spp", "1");
+        assert_eq!(d.substitute("$spp").unwrap(), "<spp>");
+        let mut problems = Problems::default();
+        d.report_unused(&mut problems);
+        let message = problems.finish().unwrap_err().to_string();
+        assert!(message.contains("no parameter $ssp"), "{message}");
+        assert!(message.contains("did you mean \"spp\"?"), "{message}");
+    }
+
+    #[test]
+    fn doubling_a_value_again_and_again_ends_in_an_error() {
+        let mut d = Defines::default();
+        d.set_default("a0", "0123456789");
+        let grown = (0..60).try_for_each(|i| {
+            let value = d.substitute(&format!("$a{i}$a{i}"))?.into_owned();
+            d.set_default(&format!("a{}", i + 1), &value);
+            Ok::<_, Error>(())
+        });
+        assert!(grown.unwrap_err().to_string().contains("MiB"));
+    }
+}

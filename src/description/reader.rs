@@ -1,0 +1,488 @@
+//! Walks the XML tree and writes down nodes and properties: what each tag of the format means. Errors are
+//! gathered and the walk goes on with the next tag; depth, elements and bytes are bounded over all files
+//! together, so that no arrangement of includes can run away.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::sync::atomic::AtomicBool;
+
+use super::defines::Defines;
+use super::element::{Element, File};
+use super::resolve::{self, Reference, Scopes};
+use super::upgrade::{self, Version};
+use super::xml::{self, Lines};
+use super::{Description, Kind, Node, NodeId, Options, Property, Value, transform, values};
+use crate::error::{Error, Kind as ErrorKind, Location, Problem, Problems, Result};
+
+/// Levels of nested plugins and includes.
+pub(super) const MAX_DEPTH: usize = 64;
+/// Elements in all files together.
+const MAX_ELEMENTS: usize = 4_000_000;
+/// Includes carried out in all files together.
+const MAX_INCLUDES: usize = 10_000;
+/// Problems that a user can make use of; the walk stops there.
+const MAX_PROBLEMS: usize = 100;
+
+/// Tags that are neither plugins nor plain values.
+const STRUCTURE: [&str; 7] = [
+    "default",
+    "path",
+    "include",
+    "alias",
+    "ref",
+    "transform",
+    "animation",
+];
+
+#[derive(Debug)]
+pub(super) struct Reader<'o> {
+    options: &'o Options,
+    pub(super) nodes: Vec<Node>,
+    pub(super) ids: BTreeMap<String, (NodeId, Location)>,
+    pub(super) references: Vec<Reference>,
+    pub(super) lost_ids: LostIds,
+    scopes: Scopes,
+    defines: Defines,
+    problems: Problems,
+    problem_count: usize,
+    warnings: Vec<Problem>,
+    /// Nodes of files that are older than the current names.
+    old_nodes: Vec<NodeId>,
+    elements: usize,
+    includes: usize,
+    bytes: u64,
+    /// The files being read, outermost first, each with the place that asked for it.
+    open_files: Vec<(PathBuf, Location)>,
+}
+
+impl<'o> Reader<'o> {
+    pub(super) fn new(options: &'o Options) -> Self {
+        Self {
+            options,
+            nodes: Vec::new(),
+            ids: BTreeMap::new(),
+            references: Vec::new(),
+            lost_ids: LostIds::Some(BTreeSet::new()),
+            scopes: Scopes::new(),
+            defines: Defines::new(&options.defines),
+            problems: Problems::default(),
+            problem_count: 0,
+            warnings: Vec::new(),
+            old_nodes: Vec::new(),
+            elements: 0,
+            includes: 0,
+            bytes: 0,
+            open_files: Vec::new(),
+        }
+    }
+
+    /// Reads the whole scene and resolves it.
+    pub(super) fn scene(mut self, text: &str, path: &Path) -> Result<Description> {
+        self.open_files
+            .push((canonical(path), Location::of_file(path)));
+        let scope = self.scopes.open(path, Scopes::WORKING_DIRECTORY);
+        self.document(text, path, scope, None)?;
+        let mut problems = std::mem::take(&mut self.problems);
+        if self.problem_count < MAX_PROBLEMS {
+            self.defines.report_unused(&mut problems);
+        }
+        resolve::references(&mut self, &mut problems);
+        for id in std::mem::take(&mut self.old_nodes) {
+            problems.take(upgrade::texture_placement(&mut self.nodes[id.index()]));
+        }
+        resolve::duplicates(&self.nodes, &mut problems);
+        // What an unresolved reference stands for is unknown, so there may be no loop to speak of.
+        if problems.is_empty() {
+            resolve::nesting(&self.nodes, &mut problems);
+        }
+        problems.finish()?;
+        Ok(Description {
+            nodes: self.nodes,
+            scopes: self.scopes,
+            warnings: self.warnings,
+        })
+    }
+
+    /// Reads one file: the scene itself, or what `include` asks for.
+    fn document(
+        &mut self,
+        text: &str,
+        path: &Path,
+        scope: u32,
+        include: Option<Place<'_>>,
+    ) -> Result<()> {
+        let lines = Lines::new(text, path);
+        self.bytes += text.len() as u64;
+        if self.bytes > xml::MAX_BYTES {
+            let limit = xml::MAX_BYTES >> 20;
+            return Err(
+                Error::input(format!("the scene's files hold more than {limit} MiB"))
+                    .at(&lines.at(0)),
+            );
+        }
+        let tree = xml::parse(text, &lines)?;
+        let root = Element::open(tree.root_element(), &lines, &mut self.defines)?;
+        let version = root
+            .required("version")
+            .map_err(|e| e.help("write version=\"3.0.0\""))?
+            .parse::<Version>()
+            .map_err(|e| e.at(root.attribute_location("version")))?;
+        let file = File {
+            lines,
+            version,
+            scope,
+        };
+        if version < Version::CURRENT_NAMES {
+            self.warn_of_upgrade(&root);
+        }
+        match include {
+            None => self.root(&root, &file),
+            Some(place) if root.tag == "scene" => {
+                root.only(&["version", "type", "id", "name"])?;
+                self.children(&root, &file, place.parent, place.depth);
+                Ok(())
+            }
+            Some(place) => self.plugin(&root, &file, place, &["version", "type", "id", "name"]),
+        }
+    }
+
+    fn root(&mut self, root: &Element<'_>, file: &File<'_>) -> Result<()> {
+        if root.tag != "scene" {
+            return Err(root.error(format!("expected <scene>, found <{}>", root.tag)));
+        }
+        root.only(&["version", "type", "id", "name"])?;
+        let id = self.node(root, file, Kind::Scene, "scene")?;
+        self.children(root, file, id, 1);
+        Ok(())
+    }
+
+    fn children(&mut self, element: &Element<'_>, file: &File<'_>, parent: NodeId, depth: usize) {
+        for child in element.children() {
+            if self.problem_count >= MAX_PROBLEMS {
+                return;
+            }
+            if let Err(error) = self.child(child, file, parent, depth) {
+                self.note(error, child, file);
+            }
+        }
+    }
+
+    /// Notes that `child` could not be read, and which ids are unknown for that reason.
+    fn note(&mut self, error: Error, child: roxmltree::Node<'_, '_>, file: &File<'_>) {
+        self.problem_count += error.problems().len();
+        self.problems.push(error);
+        if self.problem_count >= MAX_PROBLEMS {
+            let message = "too many problems: the rest of the scene was not read";
+            self.problems
+                .push(Error::input(message).at(&file.lines.at(child.range().start)));
+            self.lost_ids = LostIds::Any;
+        }
+        if child.has_tag_name("include") {
+            self.lost_ids = LostIds::Any;
+        }
+        if let LostIds::Some(ids) = &mut self.lost_ids {
+            ids.extend(
+                child
+                    .descendants()
+                    .filter_map(|n| n.attribute("id"))
+                    .map(str::to_owned),
+            );
+        }
+    }
+
+    fn child(
+        &mut self,
+        node: roxmltree::Node<'_, '_>,
+        file: &File<'_>,
+        parent: NodeId,
+        depth: usize,
+    ) -> Result<()> {
+        self.elements += 1;
+        if self.elements > MAX_ELEMENTS {
+            self.problem_count = MAX_PROBLEMS; // There is no use in going on.
+            return Err(Error::input(format!("more than {MAX_ELEMENTS} elements"))
+                .at(&file.lines.at(node.range().start)));
+        }
+        let element = Element::open(node, &file.lines, &mut self.defines)?;
+        let place = Place {
+            parent,
+            depth,
+            name: None,
+        };
+        match element.tag {
+            "spectrum" if element.optional("type").is_some() => {
+                self.plugin(&element, file, place, &["type", "id", "name"])
+            }
+            tag if values::TAGS.contains(&tag) => self.value(&element, file, parent),
+            "transform" | "animation" => self.motion(&element, file, parent),
+            "ref" => self.reference(&element, file, parent),
+            "include" => self.include(&element, file, place),
+            "default" => self.default(&element, file),
+            "path" => self.path(&element, file, parent),
+            "alias" => self.alias(&element, file),
+            _ => self.plugin(&element, file, place, &["type", "id", "name"]),
+        }
+    }
+
+    fn plugin(
+        &mut self,
+        element: &Element<'_>,
+        file: &File<'_>,
+        place: Place<'_>,
+        attributes: &[&str],
+    ) -> Result<()> {
+        let tag = element.tag;
+        let kind = Kind::of_tag(tag).ok_or_else(|| match tag {
+            "translate" | "rotate" | "scale" | "lookat" | "lookAt" | "matrix" => {
+                element.error(format!("<{tag}> stands inside <transform>"))
+            }
+            _ => {
+                let plugins = Kind::ALL.iter().map(|kind| kind.tag());
+                element
+                    .error(format!("unknown tag <{tag}>"))
+                    .suggest(tag, plugins.chain(values::TAGS).chain(STRUCTURE))
+            }
+        })?;
+        if kind == Kind::Scene {
+            return Err(element.error("<scene> cannot stand inside another tag"));
+        }
+        if place.depth >= MAX_DEPTH {
+            return Err(element.error(format!("nested more than {MAX_DEPTH} levels deep")));
+        }
+        element.only(attributes)?;
+        let name = element.optional("name").or(place.name).unwrap_or_default();
+        let id = self.node(element, file, kind, element.filled("type")?)?;
+        self.property(
+            file,
+            place.parent,
+            name,
+            Value::Object(id),
+            &element.location,
+        );
+        self.children(element, file, id, place.depth + 1);
+        Ok(())
+    }
+
+    /// A new node, registered under its id.
+    fn node(
+        &mut self,
+        element: &Element<'_>,
+        file: &File<'_>,
+        kind: Kind,
+        plugin: &str,
+    ) -> Result<NodeId> {
+        let node = NodeId(u32::try_from(self.nodes.len()).expect("elements are limited"));
+        let id = element.optional("id").filter(|id| !id.is_empty());
+        if let Some(id) = id {
+            self.register(id, node, element, "id")?;
+        }
+        self.nodes.push(Node {
+            kind,
+            plugin: plugin.to_owned(),
+            id: id.map(str::to_owned),
+            location: element.location.clone(),
+            properties: Vec::new(),
+            asked: Mutex::default(),
+            visited: AtomicBool::new(false),
+        });
+        if file.version < Version::CURRENT_NAMES {
+            self.old_nodes.push(node);
+        }
+        Ok(node)
+    }
+
+    fn register(
+        &mut self,
+        id: &str,
+        node: NodeId,
+        element: &Element<'_>,
+        attribute: &str,
+    ) -> Result<()> {
+        if let Some((_, first)) = self.ids.get(id) {
+            return Err(element
+                .attribute_error(attribute, format!("the id {id:?} is taken"))
+                .related(first, "the first"));
+        }
+        let location = element.attribute_location(attribute).clone();
+        self.ids.insert(id.to_owned(), (node, location));
+        Ok(())
+    }
+
+    fn property(
+        &mut self,
+        file: &File<'_>,
+        parent: NodeId,
+        name: &str,
+        value: Value,
+        location: &Location,
+    ) {
+        let parent = &mut self.nodes[parent.index()];
+        let name = if file.version < Version::CURRENT_NAMES {
+            upgrade::name(&parent.plugin, name)
+        } else {
+            name.into()
+        };
+        let property = Property::new(&name, value, location.clone(), file.scope);
+        parent.properties.push(property);
+    }
+
+    fn value(&mut self, element: &Element<'_>, file: &File<'_>, parent: NodeId) -> Result<()> {
+        let name = element.filled("name")?;
+        let value = values::value(element, self.options.strict, |name| {
+            self.scopes.find(file.scope, name)
+        })?;
+        element.no_children(&file.lines)?;
+        self.property(file, parent, name, value, &element.location);
+        Ok(())
+    }
+
+    fn motion(&mut self, element: &Element<'_>, file: &File<'_>, parent: NodeId) -> Result<()> {
+        element.only(&["name"])?;
+        let name = element.filled("name")?;
+        let (defines, strict) = (&mut self.defines, self.options.strict);
+        let value = match element.tag {
+            "animation" => Value::Animation(transform::animation(element, file, defines, strict)?),
+            _ => Value::Transform(transform::transform(element, file, defines, strict)?),
+        };
+        self.property(file, parent, name, value, &element.location);
+        Ok(())
+    }
+
+    fn reference(&mut self, element: &Element<'_>, file: &File<'_>, parent: NodeId) -> Result<()> {
+        element.only(&["id", "name"])?;
+        element.no_children(&file.lines)?;
+        let target = element.filled("id")?.to_owned();
+        let name = element.optional("name").unwrap_or_default();
+        // Which node it is may be known only at the end; until then the parent itself stands in.
+        self.property(file, parent, name, Value::Object(parent), &element.location);
+        self.references.push(Reference {
+            node: parent,
+            property: self.nodes[parent.index()].properties.len() - 1,
+            target,
+        });
+        Ok(())
+    }
+
+    fn include(&mut self, element: &Element<'_>, file: &File<'_>, place: Place<'_>) -> Result<()> {
+        element.only(&["filename", "name"])?;
+        element.no_children(&file.lines)?;
+        if place.depth >= MAX_DEPTH {
+            return Err(element.error(format!("nested more than {MAX_DEPTH} levels deep")));
+        }
+        self.includes += 1;
+        if self.includes > MAX_INCLUDES {
+            self.problem_count = MAX_PROBLEMS; // There is no use in going on.
+            return Err(element.error(format!("more than {MAX_INCLUDES} includes")));
+        }
+        let path = self
+            .scopes
+            .find(file.scope, element.filled("filename")?)
+            .map_err(|e| e.at(element.attribute_location("filename")))?;
+        let file_id = canonical(&path);
+        if let Some((_, first)) = self.open_files.iter().find(|(open, _)| *open == file_id) {
+            return Err(element
+                .error(format!("{} includes itself", path.display()))
+                .related(first, "it was opened"));
+        }
+        let text = xml::read_text(&path).map_err(|e| e.at(&element.location))?;
+        self.open_files.push((file_id, element.location.clone()));
+        let scope = self.scopes.open(&path, file.scope);
+        let place = Place {
+            depth: place.depth + 1,
+            name: element.optional("name"),
+            ..place
+        };
+        let result = self.document(&text, &path, scope, Some(place));
+        self.open_files.pop();
+        result
+    }
+
+    fn default(&mut self, element: &Element<'_>, file: &File<'_>) -> Result<()> {
+        element.only(&["name", "value"])?;
+        element.no_children(&file.lines)?;
+        let name = element.filled("name")?;
+        self.defines.set_default(name, element.required("value")?);
+        Ok(())
+    }
+
+    fn path(&mut self, element: &Element<'_>, file: &File<'_>, parent: NodeId) -> Result<()> {
+        element.only(&["value"])?;
+        element.no_children(&file.lines)?;
+        if parent != NodeId::ROOT {
+            return Err(element.error("<path> stands directly inside <scene>"));
+        }
+        let folder = self
+            .scopes
+            .find(file.scope, element.filled("value")?)
+            .map_err(|e| e.at(element.attribute_location("value")))?;
+        if !folder.is_dir() {
+            return Err(
+                element.attribute_error("value", format!("{} is not a folder", folder.display()))
+            );
+        }
+        self.scopes.add(file.scope, folder);
+        Ok(())
+    }
+
+    fn alias(&mut self, element: &Element<'_>, file: &File<'_>) -> Result<()> {
+        element.only(&["id", "as"])?;
+        element.no_children(&file.lines)?;
+        let (id, alias) = (element.filled("id")?, element.filled("as")?);
+        let Some(&(node, _)) = self.ids.get(id) else {
+            return Err(element
+                .attribute_error("id", format!("nothing above has the id {id:?}"))
+                .suggest(id, self.ids.keys().map(String::as_str)));
+        };
+        self.register(alias, node, element, "as")
+    }
+
+    fn warn_of_upgrade(&mut self, root: &Element<'_>) {
+        let version = root.optional("version").unwrap_or_default();
+        let warning = Problem {
+            kind: ErrorKind::Input,
+            message: format!(
+                "version {version} is read with the names of version 2.0 (maxDepth as max_depth)"
+            ),
+            location: Some(root.location.clone()),
+            help: None,
+            related: None,
+        };
+        if !self.warnings.contains(&warning) {
+            self.warnings.push(warning);
+        }
+    }
+}
+
+/// Ids whose absence is no news, as the tags that have them could not be read.
+#[derive(Debug)]
+pub(super) enum LostIds {
+    /// These.
+    Some(BTreeSet<String>),
+    /// There is no telling which.
+    Any,
+}
+
+impl LostIds {
+    pub(super) fn contains(&self, id: &str) -> bool {
+        match self {
+            Self::Some(ids) => ids.contains(id),
+            Self::Any => true,
+        }
+    }
+}
+
+/// Where a plugin goes.
+#[derive(Clone, Copy, Debug)]
+struct Place<'n> {
+    parent: NodeId,
+    /// Levels above it.
+    depth: usize,
+    /// Its property's name, where an `<include>` gives one.
+    name: Option<&'n str>,
+}
+
+/// The same for every way to write the path of a file.
+fn canonical(path: &Path) -> PathBuf {
+    path.canonicalize().unwrap_or_else(|_| path.to_path_buf())
+}

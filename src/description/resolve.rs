@@ -1,0 +1,198 @@
+//! What can only be known once everything is read: which node a reference means, that no node contains
+//! itself, that nothing is nested too deeply through references; and that no property is there
+//! twice; and where a file that the scene names is to be found.
+
+use std::path::{Path, PathBuf};
+
+use super::reader::{MAX_DEPTH, Reader};
+use super::{Node, NodeId, Value};
+use crate::error::{Error, Problems};
+
+/// A `<ref>` whose target is not known yet.
+#[derive(Debug)]
+pub(super) struct Reference {
+    pub(super) node: NodeId,
+    /// Which of the node's properties it is.
+    pub(super) property: usize,
+    pub(super) target: String,
+}
+
+/// Gives every reference its node and notes those that have none.
+pub(super) fn references(reader: &mut Reader<'_>, problems: &mut Problems) {
+    /// More candidates than this are not worth the time that comparing takes.
+    const CANDIDATES: usize = 10_000;
+    for reference in &reader.references {
+        let Reference {
+            node,
+            property,
+            target,
+        } = reference;
+        let property = &mut reader.nodes[node.index()].properties[*property];
+        match reader.ids.get(target) {
+            Some(&(id, _)) => property.value = Value::Object(id),
+            None if reader.lost_ids.contains(target) => {}
+            None => problems.push(
+                Error::input(format!("nothing has the id {target:?}"))
+                    .at(&property.location)
+                    .suggest(
+                        target,
+                        reader.ids.keys().take(CANDIDATES).map(String::as_str),
+                    ),
+            ),
+        }
+    }
+}
+
+/// Notes properties that a node has twice.
+pub(super) fn duplicates(nodes: &[Node], problems: &mut Problems) {
+    for node in nodes {
+        let mut named: Vec<_> = node
+            .properties
+            .iter()
+            .filter(|p| !p.name.is_empty())
+            .collect();
+        // Stable, so that of two of the same name the one further up comes first.
+        named.sort_by_key(|p| &p.name);
+        for pair in named.windows(2).filter(|w| w[0].name == w[1].name) {
+            problems.push(
+                Error::input(format!(
+                    "{} {:?} has a second property {:?}",
+                    node.kind, node.plugin, pair[1].name
+                ))
+                .at(&pair[1].location)
+                .related(&pair[0].location, "the first"),
+            );
+        }
+    }
+}
+
+/// Notes nodes that contain themselves and nodes nested more deeply than [`MAX_DEPTH`]; what is built from the nodes
+/// may then safely recurse.
+pub(super) fn nesting(nodes: &[Node], problems: &mut Problems) {
+    #[derive(Clone, Copy, PartialEq)]
+    enum State {
+        New,
+        Open,
+        /// With so many levels of nodes below.
+        Closed(usize),
+    }
+    let mut states = vec![State::New; nodes.len()];
+    for start in 0..nodes.len() {
+        // Nodes from `start` downwards, each with the property to look at next and the levels seen below.
+        let mut path = Vec::new();
+        if states[start] == State::New {
+            states[start] = State::Open;
+            path.push((start, 0, 0));
+        }
+        while let Some((index, next, below)) = path.pop() {
+            let Some(property) = nodes[index].properties.get(next) else {
+                states[index] = State::Closed(below);
+                if let Some((_, _, seen)) = path.last_mut() {
+                    *seen = (*seen).max(below + 1);
+                }
+                continue;
+            };
+            let Value::Object(child) = property.value else {
+                path.push((index, next + 1, below));
+                continue;
+            };
+            let child = child.index();
+            let known = match states[child] {
+                State::Closed(levels) => below.max(levels + 1),
+                _ => below,
+            };
+            path.push((index, next + 1, known));
+            match states[child] {
+                State::New => {
+                    states[child] = State::Open;
+                    path.push((child, 0, 0));
+                }
+                State::Open => problems.push(
+                    Error::input(format!("this {} contains itself", describe(&nodes[child])))
+                        .at(&property.location)
+                        .related(&nodes[child].location, "it begins"),
+                ),
+                State::Closed(_) => {}
+            }
+        }
+        if matches!(states[start], State::Closed(below) if below > MAX_DEPTH) {
+            problems.push(
+                Error::input(format!(
+                    "nested more than {MAX_DEPTH} levels deep through references"
+                ))
+                .at(&nodes[start].location),
+            );
+            return;
+        }
+    }
+}
+
+fn describe(node: &Node) -> String {
+    match &node.id {
+        Some(id) => format!("{} {id:?}", node.kind),
+        None => node.kind.to_string(),
+    }
+}
+
+/// The folders in which files are looked for: each scene file has its own and goes on with those of the file that
+/// includes it.
+#[derive(Debug)]
+pub(super) struct Scopes(Vec<Scope>);
+
+#[derive(Debug)]
+struct Scope {
+    /// The latest is looked into first.
+    folders: Vec<PathBuf>,
+    parent: Option<u32>,
+}
+
+impl Scopes {
+    /// The scope of no file: the working directory.
+    pub(super) const WORKING_DIRECTORY: u32 = 0;
+
+    pub(super) fn new() -> Self {
+        Self(vec![Scope {
+            folders: vec![PathBuf::new()],
+            parent: None,
+        }])
+    }
+
+    /// A scope for the scene file `path`, included from `parent`.
+    pub(super) fn open(&mut self, path: &Path, parent: u32) -> u32 {
+        let folder = path.parent().map(Path::to_path_buf);
+        self.0.push(Scope {
+            folders: folder.into_iter().collect(),
+            parent: Some(parent),
+        });
+        u32::try_from(self.0.len() - 1).expect("a file has far fewer than 2^32 includes")
+    }
+
+    /// Adds a folder, to be looked into before the others of the scope.
+    pub(super) fn add(&mut self, scope: u32, folder: PathBuf) {
+        self.0[scope as usize].folders.push(folder);
+    }
+
+    /// The first existing file or folder called `name`, or an error without a place.
+    pub(super) fn find(&self, scope: u32, name: &str) -> Result<PathBuf, Error> {
+        if name.trim().is_empty() {
+            return Err(Error::input("the file's name is empty"));
+        }
+        let mut tried: Vec<PathBuf> = Vec::new();
+        let mut next = Some(scope);
+        while let Some(scope) = next.map(|i| &self.0[i as usize]) {
+            for folder in scope.folders.iter().rev() {
+                let path = folder.join(name);
+                if path.exists() {
+                    return Ok(path);
+                }
+                if !tried.contains(&path) {
+                    tried.push(path);
+                }
+            }
+            next = scope.parent;
+        }
+        let places: Vec<_> = tried.iter().map(|p| p.display().to_string()).collect();
+        Err(Error::input(format!("cannot find the file {name:?}"))
+            .help(format!("tried {}", places.join(", "))))
+    }
+}

@@ -1,0 +1,186 @@
+//! From bytes to an XML tree and from offsets to lines and columns. Everything that makes an XML reader
+//! slow or greedy (document types, namespaces, thousands of attributes in one tag) is refused before the
+//! tree is made, for a scene has no use for it.
+
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+use std::sync::Arc;
+
+use roxmltree::{Document, ParsingOptions};
+
+use crate::error::{Error, Location, Result};
+
+/// Bytes in one scene file: about a million shapes.
+pub(super) const MAX_BYTES: u64 = 256 << 20;
+/// Elements, comments and texts in one scene file.
+const MAX_NODES: u32 = 8_000_000;
+/// Attributes in one tag; the XML reader compares each with all before it.
+const MAX_ATTRIBUTES: usize = 1000;
+
+/// The text of a regular file of at most [`MAX_BYTES`].
+pub(super) fn read_text(path: &Path) -> Result<String> {
+    let refused = |cause| Error::system("read", path, &cause);
+    let file = File::open(path).map_err(refused)?;
+    if !file.metadata().map_err(refused)?.is_file() {
+        return Err(Error::input("not a regular file").at(&Location::of_file(path)));
+    }
+    let mut bytes = Vec::new();
+    file.take(MAX_BYTES + 1)
+        .read_to_end(&mut bytes)
+        .map_err(refused)?;
+    if bytes.len() as u64 > MAX_BYTES {
+        return Err(Error::input(format!("larger than {} MiB", MAX_BYTES >> 20))
+            .at(&Location::of_file(path)));
+    }
+    String::from_utf8(bytes).map_err(|e| {
+        let line = 1 + e.as_bytes()[..e.utf8_error().valid_up_to()]
+            .iter()
+            .filter(|&&b| b == b'\n')
+            .count();
+        Error::input("the text is not UTF-8").at(&Location::of_line(
+            path,
+            u32::try_from(line).unwrap_or(u32::MAX),
+        ))
+    })
+}
+
+/// The XML tree of `text`; syntax errors are located.
+pub(super) fn parse<'t>(text: &'t str, lines: &Lines<'t>) -> Result<Document<'t>> {
+    if text.len() as u64 > MAX_BYTES {
+        return Err(Error::input(format!("larger than {} MiB", MAX_BYTES >> 20)).at(&lines.at(0)));
+    }
+    refuse_greedy_tags(text, lines)?;
+    let options = ParsingOptions {
+        nodes_limit: MAX_NODES,
+        ..ParsingOptions::default()
+    };
+    Document::parse_with_options(text, options).map_err(|e| {
+        let pos = e.pos();
+        let message = match e {
+            roxmltree::Error::DtdDetected => {
+                "a scene has no document type: remove <!DOCTYPE".into()
+            }
+            roxmltree::Error::NodesLimitReached => format!("more than {MAX_NODES} XML nodes"),
+            roxmltree::Error::UnclosedRootNode | roxmltree::Error::UnexpectedEndOfStream => {
+                "the file ends inside an element".into()
+            }
+            roxmltree::Error::InvalidChar(b'"' | b'\'', b'<', _) => {
+                "'<' inside an attribute: close the quotes, or write &lt;".into()
+            }
+            _ => e.to_string().replace(&format!(" at {pos}"), ""),
+        };
+        Error::input(format!("not well-formed XML: {message}")).at(&Location {
+            file: lines.file.clone(),
+            line: pos.row,
+            column: pos.col,
+        })
+    })
+}
+
+fn refuse_greedy_tags(text: &str, lines: &Lines<'_>) -> Result<()> {
+    let mut start = 0;
+    for piece in text.split('<') {
+        // A tag with its attributes has no `<` inside, so that each piece holds at most one.
+        if !piece.starts_with(['!', '?', '/']) {
+            if piece
+                .bytes()
+                .filter(|&b| b == b'=')
+                .take(MAX_ATTRIBUTES + 1)
+                .count()
+                > MAX_ATTRIBUTES
+            {
+                return Err(Error::input(format!(
+                    "more than {MAX_ATTRIBUTES} attributes in a tag"
+                ))
+                .at(&lines.at(start)));
+            }
+            if piece.contains("xmlns") {
+                return Err(
+                    Error::input("a scene has no namespaces: remove xmlns").at(&lines.at(start))
+                );
+            }
+        }
+        start += piece.len() + 1;
+    }
+    Ok(())
+}
+
+/// Finds line and column of an offset, in time that depends neither on the offset nor on the line's length.
+#[derive(Debug)]
+pub(super) struct Lines<'t> {
+    pub(super) file: Arc<Path>,
+    text: &'t [u8],
+    /// Offset of each line's first byte.
+    starts: Vec<usize>,
+    /// Characters before each block of [`Lines::BLOCK`] bytes.
+    characters: Vec<usize>,
+}
+
+impl<'t> Lines<'t> {
+    const BLOCK: usize = 1024;
+
+    pub(super) fn new(text: &'t str, file: &Path) -> Self {
+        let text = text.as_bytes();
+        let newlines = text.iter().enumerate().filter(|&(_, &b)| b == b'\n');
+        let starts = std::iter::once(0)
+            .chain(newlines.map(|(i, _)| i + 1))
+            .collect();
+        let mut characters = vec![0];
+        for block in text.chunks(Self::BLOCK) {
+            let before = characters[characters.len() - 1];
+            characters.push(before + count_characters(block));
+        }
+        Self {
+            file: file.into(),
+            text,
+            starts,
+            characters,
+        }
+    }
+
+    pub(super) fn at(&self, offset: usize) -> Location {
+        let offset = offset.min(self.text.len());
+        let line = self.starts.partition_point(|&start| start <= offset);
+        let column = self.characters_before(offset) - self.characters_before(self.starts[line - 1]);
+        Location {
+            file: self.file.clone(),
+            line: u32::try_from(line).unwrap_or(u32::MAX),
+            column: u32::try_from(column + 1).unwrap_or(u32::MAX),
+        }
+    }
+
+    fn characters_before(&self, offset: usize) -> usize {
+        let block = offset / Self::BLOCK;
+        self.characters[block] + count_characters(&self.text[block * Self::BLOCK..offset])
+    }
+}
+
+/// Bytes that begin a UTF-8 character.
+fn count_characters(bytes: &[u8]) -> usize {
+    bytes.iter().filter(|&&b| b & 0xC0 != 0x80).count()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_column_counts_characters_from_the_start_of_its_line() {
+        let text = format!("é\nüb{}x\n", "ß".repeat(5000));
+        let lines = Lines::new(&text, Path::new("a.xml"));
+        let x = lines.at(text.find('x').expect("it is there"));
+        assert_eq!((x.line, x.column), (2, 5003));
+        assert_eq!((lines.at(0).line, lines.at(0).column), (1, 1));
+        let end = lines.at(usize::MAX);
+        assert_eq!((end.line, end.column), (3, 1));
+    }
+
+    #[test]
+    fn a_hundred_thousand_attributes_are_refused_at_once() {
+        let attributes: String = (0..100_000).map(|i| format!(" a{i}='1'")).collect();
+        let text = format!("<scene{attributes}/>");
+        let error = parse(&text, &Lines::new(&text, Path::new("a.xml"))).unwrap_err();
+        assert!(error.to_string().contains("more than 1000 attributes"));
+    }
+}
