@@ -1,0 +1,3 @@
+//! Colour: how numbers stand for light.
+
+pub mod srgb;
