@@ -3,9 +3,30 @@
 //! the modules stand here in reading order, and each imports only from those above it.
 
 pub mod error;
-
+pub(crate) mod family;
+pub mod math;
 pub mod color;
 
 pub mod description;
 pub mod image;
 pub mod mesh;
+
+pub mod interaction;
+
+pub mod filter;
+pub mod sampler;
+pub mod sensor;
+pub mod shape;
+pub mod texture;
+
+pub mod display;
+
+pub mod accel;
+pub mod light;
+pub mod material;
+
+pub mod scene;
+
+pub mod integrator;
+
+pub mod render;

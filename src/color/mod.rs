@@ -1,6 +1,20 @@
-//! Colour: the standard observer and daylight, and smooth reflectance spectra for RGB colours. Wavelengths
-//! are in nanometres; RGB is linear with the primaries of ITU-R BT.709 and white D65.
+//! Colour: what a path carries (RGB or N spectral bands), the standard observer and daylight, smooth
+//! spectra for RGB colours, and the sRGB curve. Wavelengths are in nanometres; RGB is linear with the
+//! primaries of ITU-R BT.709 and white D65.
 
 pub mod cie;
 pub mod d65;
+pub mod srgb;
 pub mod upsample;
+
+mod bands;
+mod model;
+mod mono;
+mod rgb;
+mod samples;
+
+pub use bands::Bands;
+pub use model::{Color, ColorModel, Role, luminance};
+pub use mono::Mono;
+pub use rgb::Rgb;
+pub use samples::{Samples, Spectral};

@@ -1,1 +1,161 @@
-//! (being written)
+//! Images: a strided buffer of named f32 channels with views, and files in and out. Reading takes EXR,
+//! HDR, PNG, JPEG, BMP and TGA and gives values as the file holds them; writing takes linear values as
+//! EXR or HDR and ready codes as PNG. Which curve lies between the two is the display layer's business.
+
+mod buffer;
+mod codes;
+mod file;
+mod format;
+mod jpeg;
+mod metadata;
+mod openexr;
+mod radiance;
+mod raster;
+mod view;
+
+use std::fs;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+
+pub use buffer::Image;
+pub use codes::{Codes, Layout, write_codes};
+pub use format::Format;
+pub use metadata::{MetaValue, Metadata, Window};
+pub use view::View;
+
+use crate::error::{Error, Location, Result};
+use format::Decoder;
+
+/// What the values of a picture mean.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Encoding {
+    /// Linear values (EXR, HDR).
+    Linear,
+    /// Code values in [0, 1], still encoded by the sRGB curve (PNG, JPEG, BMP, TGA); opacity is linear.
+    Srgb,
+}
+
+/// An image as its file holds it.
+#[derive(Clone, Debug)]
+pub struct Picture {
+    /// The values, not decoded.
+    pub image: Image,
+    /// What the values mean.
+    pub encoding: Encoding,
+    /// The file's own remarks (EXR attributes) as text, by name.
+    pub metadata: Vec<(String, String)>,
+}
+
+/// How much memory reading a file may take.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Limits {
+    /// Bytes of the decoded image, and bytes of the file.
+    pub max_bytes: u64,
+}
+
+impl Default for Limits {
+    /// 8 GiB.
+    fn default() -> Self {
+        Self { max_bytes: 8 << 30 }
+    }
+}
+
+impl Limits {
+    /// Refuses an image that takes `bytes` when decoded.
+    fn check(&self, width: u64, height: u64, bytes: u128) -> Result<()> {
+        if bytes > u128::from(self.max_bytes) {
+            return Err(Error::input(format!(
+                "the image of {width} × {height} pixels takes {bytes} bytes, more than the {} allowed",
+                self.max_bytes
+            )));
+        }
+        Ok(())
+    }
+}
+
+/// Reads an image file of any known format; its content, not its name, says which.
+///
+/// # Errors
+/// Where the file is missing, unknown, damaged, cut off or larger than `limits` allows.
+pub fn read(path: &Path, limits: &Limits) -> Result<Picture> {
+    let refused = |e: std::io::Error| Error::system("read", path, &e);
+    let there = fs::metadata(path).map_err(refused)?;
+    if !there.is_file() {
+        return Err(Error::input(format!("{} is not a file", path.display())));
+    }
+    if there.len() > limits.max_bytes {
+        return Err(Error::input(format!(
+            "the file has {} bytes, more than the {} allowed",
+            there.len(),
+            limits.max_bytes
+        ))
+        .at(&Location::of_file(path)));
+    }
+    let bytes = fs::read(path).map_err(refused)?;
+    decode(path, &bytes, limits).map_err(|e| e.at(&Location::of_file(path)))
+}
+
+/// Decodes the bytes of an image file; `path` only tells TGA from what is no image.
+fn decode(path: &Path, bytes: &[u8], limits: &Limits) -> Result<Picture> {
+    let decoder = Decoder::of_input(path, bytes)?;
+    // The checks before it should leave a decoder nothing to panic about. It is other people's code
+    // on a stranger's file, though, so a panic that slips through is one more kind of damaged file.
+    // Nothing that it could leave half-changed survives it.
+    catch_unwind(AssertUnwindSafe(|| match decoder {
+        Decoder::Exr => openexr::decode(bytes, limits),
+        Decoder::Raster(format) => raster::decode(bytes, format, limits),
+    }))
+    .unwrap_or_else(|_| Err(Error::input("the file is damaged")))
+}
+
+/// Writes linear values as EXR (all channels, metadata) or HDR (main colour), by the extension. The file
+/// appears whole or not at all.
+///
+/// # Errors
+/// Where the extension is another, the format cannot hold the image, or the file system refuses.
+pub fn write(path: &Path, image: &Image, metadata: &Metadata) -> Result<()> {
+    let whole = Window {
+        x: 0,
+        y: 0,
+        full_width: image.width(),
+        full_height: image.height(),
+    };
+    write_window(path, image, &whole, metadata)
+}
+
+/// Like [`write()`], for an image that is a part of a whole: EXR says which, HDR only stores the part.
+///
+/// # Errors
+/// As [`write()`], and where the image reaches beyond the whole.
+pub fn write_window(
+    path: &Path,
+    image: &Image,
+    window: &Window,
+    metadata: &Metadata,
+) -> Result<()> {
+    let bytes = match Format::of_output(path)? {
+        Format::Exr => openexr::encode(image, window, metadata)?,
+        Format::Hdr => radiance::encode(image)?,
+        Format::Png => {
+            return Err(Error::input(format!(
+                "linear values cannot be stored as {}",
+                path.display()
+            ))
+            .help("encode them for display first"));
+        }
+    };
+    file::write_atomically(path, &bytes)
+}
+
+/// Finds out before a render what would stop its image from being written: an unknown extension, a
+/// missing folder, a file that must not be replaced. Nothing is left behind.
+///
+/// # Errors
+/// Any of these.
+pub fn check_writable(path: &Path) -> Result<()> {
+    Format::of_output(path)?;
+    file::check_writable(path)
+}
+
+#[cfg(test)]
+mod tests;

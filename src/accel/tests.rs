@@ -1,0 +1,103 @@
+//! The tree against brute force, to the bit, and closed meshes without a hole.
+
+use super::*;
+use crate::math::{random, warp};
+use crate::mesh::{Mesh, generate};
+use crate::shape::TriangleMesh;
+use glam::{DMat4, DVec3, Vec2, Vec3};
+
+fn uniform(seed: u64, i: u32) -> f32 {
+    random::unit(random::bits(seed, i))
+}
+
+fn direction(seed: u64, i: u32) -> Vec3 {
+    warp::uniform_sphere(Vec2::new(uniform(seed, 2 * i), uniform(seed, 2 * i + 1)))
+}
+
+/// Rays from points in and around the unit ball, some along axes and some aimed at vertices.
+fn rays(count: u32, targets: &[Vec3]) -> Vec<Ray> {
+    (0..count)
+        .map(|i| {
+            let origin = direction(1, i) * 2.5 * uniform(2, i);
+            let direction = match i % 4 {
+                0 => (targets[i as usize % targets.len()] - origin).normalize(),
+                1 => Vec3::from_array(std::array::from_fn(|a| if a == i as usize / 4 % 3 { -1.0 } else { 0.0 })),
+                _ => direction(3, i),
+            };
+            Ray { origin, direction, t_max: f32::INFINITY, time: 0.0 }
+        })
+        .collect()
+}
+
+fn both(shapes: &[Arc<Geometry>], groups: &[u32], instances: &[Instance]) -> [Tracer; 2] {
+    [Method::Brute, Method::Tree].map(|m| Tracer::new(shapes.to_vec(), groups, instances.to_vec(), m))
+}
+
+fn agree(tracers: &[Tracer; 2], rays: &[Ray]) -> usize {
+    let [mut a, mut b] = [Vec::new(), Vec::new()];
+    let mut counts = Counts::default();
+    tracers[0].closest(rays, &mut a, &mut counts);
+    tracers[1].closest(rays, &mut b, &mut counts);
+    assert_eq!(a, b);
+    let [mut c, mut d] = [Vec::new(), Vec::new()];
+    let limited = || rays.iter().enumerate().map(|(i, r)| Ray { t_max: uniform(9, i as u32) * 3.0, ..*r });
+    tracers[0].occluded(limited(), &mut c, &mut counts);
+    tracers[1].occluded(limited(), &mut d, &mut counts);
+    assert_eq!(c, d);
+    a.iter().filter(|h| !h.is_miss()).count()
+}
+
+#[test]
+fn the_tree_and_brute_force_find_the_same_hits_to_the_bit() {
+    let mesh = generate::bumpy_sphere(3, 7);
+    let targets = mesh.positions.clone();
+    // The same mesh twice: every hit is a tie.
+    let shapes = [mesh.clone(), mesh, generate::cube()].map(|m| Arc::new(Geometry::Mesh(TriangleMesh::new(m))));
+    let transform = DMat4::from_translation(DVec3::new(0.3, 0.2, -1.0)) * DMat4::from_scale(DVec3::new(0.5, -2.0, 1.0));
+    let to_world = Transform::new(&transform).unwrap();
+    let instances = [Instance { to_world, group: 1 }, Instance { to_world: Transform::IDENTITY, group: 1 }];
+    let tracers = both(&shapes, &[0, 0, 1], &instances);
+    assert!(agree(&tracers, &rays(20_000, &targets)) > 10_000);
+}
+
+#[test]
+fn scenes_of_nothing_and_of_one_triangle_can_be_traced() {
+    let targets = [Vec3::ZERO];
+    assert_eq!(agree(&both(&[], &[], &[]), &rays(100, &targets)), 0);
+    let mut one = generate::rectangle();
+    one.triangles.truncate(1);
+    let shapes = [one, Mesh::default()].map(|m| Arc::new(Geometry::Mesh(TriangleMesh::new(m))));
+    assert!(agree(&both(&shapes, &[0, 0], &[]), &rays(1000, &targets)) > 10);
+}
+
+#[test]
+fn equal_triangles_by_the_hundred_thousand_build_in_a_moment() {
+    let mut mesh = generate::rectangle();
+    mesh.triangles = vec![mesh.triangles[0]; 320_000];
+    let shapes = vec![Arc::new(Geometry::Mesh(TriangleMesh::new(mesh)))];
+    let tracer = Tracer::new(shapes, &[0], Vec::new(), Method::Tree);
+    let ray = Ray { origin: Vec3::new(0.5, -0.6, 1.0), direction: Vec3::NEG_Z, t_max: f32::INFINITY, time: 0.0 };
+    let (mut hits, mut counts) = (Vec::new(), Counts::default());
+    tracer.closest(&[ray], &mut hits, &mut counts);
+    assert_eq!(hits[0].primitive, 0, "ties go to the lowest primitive");
+}
+
+#[test]
+fn a_closed_mesh_has_no_hole_at_vertices_and_edges() {
+    let mesh = generate::bumpy_sphere(4, 3);
+    let (positions, triangles) = (mesh.positions.clone(), mesh.triangles.clone());
+    let tracer = Tracer::new(vec![Arc::new(Geometry::Mesh(TriangleMesh::new(mesh)))], &[0], Vec::new(), Method::Tree);
+    let n = 200_000;
+    let rays: Vec<Ray> = (0..n)
+        .map(|i| {
+            let corners = triangles[i as usize % triangles.len()].map(|v| positions[v as usize]);
+            let share = if i % 2 == 0 { 0.0 } else { uniform(5, i) };
+            let target = corners[0] + share * (corners[1] - corners[0]);
+            let origin = direction(6, i) * 0.1;
+            Ray { origin, direction: (target - origin).normalize(), t_max: f32::INFINITY, time: 0.0 }
+        })
+        .collect();
+    let (mut hits, mut counts) = (Vec::new(), Counts::default());
+    tracer.closest(&rays, &mut hits, &mut counts);
+    assert_eq!(hits.iter().filter(|h| h.is_miss()).count(), 0);
+}

@@ -1,0 +1,57 @@
+//! Rays against triangles, watertight: the shear of Woop, Benthin and Wald (*Watertight ray/triangle
+//! intersection*, 2013). Edge functions are differences of two products that are rounded one by one,
+//! never fused: rounding is monotonic, so their sign is right wherever it is not zero, and zero counts
+//! as inside.
+
+use glam::Vec3;
+
+use crate::interaction::Ray;
+
+/// A ray prepared for triangles: the axis along which it mostly goes becomes z, and a shear makes it
+/// that axis.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Shear {
+    origin: Vec3,
+    axes: [usize; 3],
+    shear: [f32; 3],
+}
+
+impl Shear {
+    pub(super) fn new(ray: &Ray) -> Self {
+        let d = ray.direction.to_array();
+        let magnitude = d.map(f32::abs);
+        let z = if magnitude[0] > magnitude[1] && magnitude[0] > magnitude[2] {
+            0
+        } else if magnitude[1] > magnitude[2] {
+            1
+        } else {
+            2
+        };
+        // Winding is kept where the ray goes backwards along z.
+        let (x, y) = if d[z] < 0.0 { ((z + 2) % 3, (z + 1) % 3) } else { ((z + 1) % 3, (z + 2) % 3) };
+        Self { origin: ray.origin, axes: [x, y, z], shear: [d[x] / d[z], d[y] / d[z], 1.0 / d[z]] }
+    }
+
+    /// (t, u, v) with 0 < t ≤ `limit`; u and v are the second and third barycentric coordinates.
+    #[inline]
+    pub(super) fn intersect(&self, corners: [Vec3; 3], limit: f32) -> Option<(f32, f32, f32)> {
+        let [x, y, z] = self.axes;
+        let [a, b, c] = corners.map(|p| {
+            let p = (p - self.origin).to_array();
+            (p[x] - self.shear[0] * p[z], p[y] - self.shear[1] * p[z], p[z])
+        });
+        let u = c.0 * b.1 - c.1 * b.0;
+        let v = a.0 * c.1 - a.1 * c.0;
+        let w = b.0 * a.1 - b.1 * a.0;
+        if (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0) {
+            return None;
+        }
+        let determinant = u + v + w;
+        if determinant == 0.0 {
+            return None;
+        }
+        let inverse = 1.0 / determinant;
+        let t = (u * a.2 + v * b.2 + w * c.2) * self.shear[2] * inverse;
+        (t > 0.0 && t <= limit).then_some((t, v * inverse, w * inverse))
+    }
+}

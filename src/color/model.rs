@@ -1,0 +1,76 @@
+//! What "a colour" is during a render: three RGB values or N spectral bands. Everything that carries
+//! light is generic over [`ColorModel`]; geometry is not. A scene holds colours in their stored form, made
+//! once while it is built, and a path evaluates them at its own wavelengths.
+
+use super::samples::Spectral;
+
+/// A colour as a scene file gives it.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Color {
+    /// `<float>`: grey, or light of that many times D65's.
+    Grey(f64),
+    /// `<rgb>`: linear BT.709.
+    Rgb([f64; 3]),
+    /// `<spectrum value="0.5">`: the same at all wavelengths (as emission: equal energy).
+    Flat(f64),
+    /// Pairs of a wavelength in nm and a value, wavelengths increasing; linear between them, 0 outside.
+    Curve(Vec<(f64, f64)>),
+    /// CIE standard illuminant D65 times a factor, such that 1 is the white of RGB.
+    D65(f64),
+}
+
+/// What a colour stands for, which decides how it is bounded and upsampled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Role {
+    /// A fraction in [0, 1]: reflectance, transmittance, opacity.
+    Reflectance,
+    /// Light: unbounded, D65 times the colour where an RGB triple gives it.
+    Emission,
+    /// Another physical quantity over wavelength, unbounded: an index of refraction.
+    Quantity,
+}
+
+/// RGB or N bands.
+pub trait ColorModel: Clone + std::fmt::Debug + Send + Sync + 'static {
+    /// A colour, ready to be evaluated at any wavelength.
+    type Stored: Clone + std::fmt::Debug + Send + Sync;
+    /// A texel's colour, ready to be evaluated: small, for there are millions.
+    type Texel: Copy + std::fmt::Debug + Send + Sync;
+    /// The wavelengths that one path carries.
+    type Wavelengths: Copy + std::fmt::Debug + Send + Sync;
+    /// One value for each of them.
+    type Sample: Spectral;
+
+    /// The wavelengths of a path, from a random number in [0, 1).
+    fn wavelengths(&self, u: f32) -> Self::Wavelengths;
+    /// The throughput at a path's start: 1 in each channel in use.
+    fn unit(&self) -> Self::Sample;
+    /// A scene's colour in its stored form; the error says what is wrong with the value.
+    fn store(&self, color: &Color, role: Role) -> Result<Self::Stored, String>;
+    /// A stored colour at a path's wavelengths.
+    fn evaluate(stored: &Self::Stored, wavelengths: &Self::Wavelengths) -> Self::Sample;
+    /// A texel of linear BT.709 in its stored form; reflectances are clamped to [0, 1].
+    fn texel(&self, rgb: [f32; 3], role: Role) -> Self::Texel;
+    /// A texel at a path's wavelengths.
+    fn evaluate_texel(texel: &Self::Texel, wavelengths: &Self::Wavelengths) -> Self::Sample;
+
+    /// The channels of an image: `R`, `G`, `B`, and one a band.
+    fn channels(&self) -> Vec<String>;
+    /// Writes a sample's value for each of [`Self::channels`] to the start of `out`.
+    fn develop(&self, sample: &Self::Sample, wavelengths: &Self::Wavelengths, out: &mut [f32]);
+}
+
+/// The luminance of linear BT.709.
+pub fn luminance(rgb: [f32; 3]) -> f32 {
+    0.212_671 * rgb[0] + 0.715_16 * rgb[1] + 0.072_169 * rgb[2]
+}
+
+/// Linear BT.709 of CIE XYZ.
+pub fn xyz_to_rgb(xyz: [f64; 3]) -> [f64; 3] {
+    const M: [[f64; 3]; 3] = [
+        [3.240_479, -1.537_150, -0.498_535],
+        [-0.969_256, 1.875_991, 0.041_556],
+        [0.055_648, -0.204_043, 1.057_311],
+    ];
+    M.map(|row| row[0] * xyz[0] + row[1] * xyz[1] + row[2] * xyz[2])
+}

@@ -1,0 +1,54 @@
+//! One number instead of a colour, for parameters that are numbers: opacity, roughness, weights. A
+//! texture of numbers is a texture of this model.
+
+use super::model::{Color, ColorModel, Role, luminance};
+use super::rgb::check;
+use super::samples::Samples;
+
+/// The model of plain numbers; a colour counts as its luminance.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Mono;
+
+impl ColorModel for Mono {
+    type Stored = f32;
+    type Texel = f32;
+    type Wavelengths = ();
+    type Sample = Samples<1>;
+
+    fn wavelengths(&self, _u: f32) {}
+
+    fn unit(&self) -> Samples<1> {
+        Samples([1.0])
+    }
+
+    fn store(&self, color: &Color, role: Role) -> Result<f32, String> {
+        let value = match color {
+            Color::Grey(value) | Color::Flat(value) | Color::D65(value) => *value,
+            Color::Rgb(rgb) => f64::from(luminance(rgb.map(|v| v as f32))),
+            Color::Curve(_) => return Err("a number is needed, not a spectrum".into()),
+        };
+        check([value], role)?;
+        Ok(value as f32)
+    }
+
+    fn evaluate(stored: &f32, _wavelengths: &()) -> Samples<1> {
+        Samples([*stored])
+    }
+
+    fn texel(&self, rgb: [f32; 3], role: Role) -> f32 {
+        let value = luminance(rgb);
+        if role == Role::Reflectance { value.clamp(0.0, 1.0) } else { value }
+    }
+
+    fn evaluate_texel(texel: &f32, _wavelengths: &()) -> Samples<1> {
+        Samples([*texel])
+    }
+
+    fn channels(&self) -> Vec<String> {
+        vec!["Y".into()]
+    }
+
+    fn develop(&self, sample: &Samples<1>, _wavelengths: &(), out: &mut [f32]) {
+        out[0] = sample.0[0];
+    }
+}

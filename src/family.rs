@@ -1,0 +1,111 @@
+//! Plugin families: a table of names becomes an enum, its `NAMES` and its `build`.
+//!
+//! A family is a trait (what every member can do) and an enum (all the members there are). The enum
+//! derefs to the trait, so a member is called as `sampler.set_size()` and nobody writes a match by hand.
+//! A new member is one file and two lines: `mod x;` and a row in the table.
+
+/// Declares the enum of a plugin family. `$context` is what a member's `build` is given besides its
+/// properties.
+macro_rules! family {
+    (
+        $(#[$meta:meta])*
+        $vis:vis enum $family:ident $(<$color:ident>)? : $interface:ident, kind $kind:literal, context $context:ty {
+            $($name:literal => $member:ident in $module:ident),+ $(,)?
+        }
+    ) => {
+        $(#[$meta])*
+        #[allow(missing_docs)] // each variant is documented at the plugin that it holds
+        $vis enum $family $(<$color: crate::color::ColorModel>)? {
+            $($member($module::$member $(<$color>)?)),+
+        }
+
+        impl $(<$color: crate::color::ColorModel>)? $family $(<$color>)? {
+            /// The names of the members, as scene files write them.
+            $vis const NAMES: &'static [&'static str] = &[$($name),+];
+
+            /// Builds the member that `properties` names; an unknown name is an error with a suggestion.
+            $vis fn build(
+                properties: &crate::description::Properties<'_>,
+                context: &$context,
+            ) -> crate::error::Result<Self> {
+                match properties.plugin() {
+                    $($name => Ok(Self::$member($module::$member::build(properties, context)?)),)+
+                    other => Err(crate::family::unknown(properties, $kind, other, Self::NAMES)),
+                }
+            }
+        }
+
+        impl $(<$color: crate::color::ColorModel>)? std::ops::Deref for $family $(<$color>)? {
+            type Target = dyn $interface $(<$color>)?;
+
+            fn deref(&self) -> &Self::Target {
+                match self {
+                    $(Self::$member(member) => member),+
+                }
+            }
+        }
+    };
+}
+
+pub(crate) use family;
+
+use crate::description::{Kind, Properties};
+use crate::error::Error;
+
+/// Plugins of Mitsuba 3.9 by kind: a name found here is not misspelt, Étendue lacks it.
+const MITSUBA: &[(Kind, &[&str])] = &[
+    (
+        Kind::Shape,
+        &[
+            "bsplinecurve", "cube", "cylinder", "disk", "ellipsoids", "ellipsoidsmesh", "instance",
+            "linearcurve", "merge", "obj", "ply", "rectangle", "sdfgrid", "serialized", "shapegroup", "sphere",
+        ],
+    ),
+    (
+        Kind::Bsdf,
+        &[
+            "blendbsdf", "bumpmap", "circular", "conductor", "dielectric", "diffuse", "hair", "mask",
+            "measured", "measured_polarized", "normalmap", "null", "plastic", "polarizer", "pplastic",
+            "principled", "principledthin", "retarder", "roughconductor", "roughdielectric", "roughplastic",
+            "thindielectric", "twosided",
+        ],
+    ),
+    (
+        Kind::Emitter,
+        &[
+            "area", "constant", "directional", "directionalarea", "envmap", "point", "projector", "spot",
+            "sunsky", "timed_sunsky", "volumelight",
+        ],
+    ),
+    (Kind::Texture, &["bitmap", "checkerboard", "mesh_attribute", "volume"]),
+    (
+        Kind::Spectrum,
+        &["blackbody", "d65", "irregular", "rawconstant", "regular", "srgb", "uniform"],
+    ),
+    (
+        Kind::Sensor,
+        &["batch", "distant", "irradiancemeter", "orthographic", "perspective", "radiancemeter", "thinlens"],
+    ),
+    (Kind::Film, &["hdrfilm", "specfilm"]),
+    (Kind::Filter, &["box", "catmullrom", "gaussian", "lanczos", "mitchell", "tent"]),
+    (Kind::Sampler, &["independent", "ldsampler", "multijitter", "orthogonal", "stratified"]),
+    (
+        Kind::Integrator,
+        &[
+            "aov", "depth", "direct", "direct_projective", "moment", "path", "prb", "prb_basic",
+            "prb_projective", "prbvolpath", "ptracer", "stokes", "volpath", "volpathmis", "volprim_rf_basic",
+        ],
+    ),
+];
+
+/// The error for a plugin that its family does not have.
+pub(crate) fn unknown(properties: &Properties<'_>, kind: &str, name: &str, names: &[&str]) -> Error {
+    let known_to_mitsuba =
+        MITSUBA.iter().any(|(k, plugins)| *k == properties.kind() && plugins.contains(&name));
+    let error = if known_to_mitsuba {
+        Error::unsupported(format!("{kind} \"{name}\" exists in Mitsuba but not in Étendue"))
+    } else {
+        Error::input(format!("unknown {kind} \"{name}\"")).suggest(name, names.iter().copied())
+    };
+    error.at(properties.location()).help(format!("there are {}", names.join(", ")))
+}

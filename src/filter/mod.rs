@@ -1,0 +1,94 @@
+//! Reconstruction filters: how far, and with what weight, a sample reaches the pixels around it. A
+//! filter is the product of two one-dimensional kernels.
+
+mod r#box;
+mod catmullrom;
+mod gaussian;
+mod lanczos;
+mod mitchell;
+mod tent;
+
+use crate::description::Properties;
+use crate::error::Result;
+use crate::family::family;
+
+/// What every filter does.
+pub trait Kernel: std::fmt::Debug + Send + Sync {
+    /// Distance in pixels from which on the kernel is 0.
+    fn radius(&self) -> f32;
+    /// The weight at a distance of |x| pixels; zero beyond the radius.
+    fn eval(&self, x: f32) -> f32;
+}
+
+family! {
+    /// Every reconstruction filter there is.
+    #[derive(Clone, Debug)]
+    pub enum Filter: Kernel, kind "rfilter", context () {
+        "box" => Box in r#box,
+        "catmullrom" => CatmullRom in catmullrom,
+        "gaussian" => Gaussian in gaussian,
+        "lanczos" => Lanczos in lanczos,
+        "mitchell" => Mitchell in mitchell,
+        "tent" => Tent in tent,
+    }
+}
+
+impl Default for Filter {
+    /// Mitsuba's: a Gaussian of standard deviation 0.5 and radius 2.
+    fn default() -> Self {
+        Self::Gaussian(gaussian::Gaussian::default())
+    }
+}
+
+/// The widest radius in pixels, so that a tile's border stays small.
+const MAX_RADIUS: f64 = 16.0;
+
+/// The property `radius`, in pixels.
+fn radius(properties: &Properties<'_>, default: f64) -> Result<f32> {
+    let radius = properties.float("radius")?.unwrap_or(default);
+    if !(0.1..=MAX_RADIUS).contains(&radius) {
+        let message = format!("a radius of {radius} pixels is not between 0.1 and {MAX_RADIUS}");
+        return Err(properties.error("radius", message));
+    }
+    Ok(radius as f32)
+}
+
+/// The two-parameter family of cubics of Mitchell and Netravali, *Reconstruction filters in computer
+/// graphics* (1988), radius 2.
+fn cubic(b: f32, c: f32, x: f32) -> f32 {
+    let x = x.abs();
+    let (x2, x3) = (x * x, x * x * x);
+    let value = if x < 1.0 {
+        (12.0 - 9.0 * b - 6.0 * c) * x3 + (-18.0 + 12.0 * b + 6.0 * c) * x2 + (6.0 - 2.0 * b)
+    } else if x < 2.0 {
+        (-b - 6.0 * c) * x3 + (6.0 * b + 30.0 * c) * x2 + (-12.0 * b - 48.0 * c) * x + (8.0 * b + 24.0 * c)
+    } else {
+        0.0
+    };
+    value / 6.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::description::{Description, Kind, Options};
+    use std::path::Path;
+
+    #[test]
+    fn every_filter_is_even_ends_at_its_radius_and_has_a_positive_integral() {
+        for name in Filter::NAMES {
+            let text = format!(r#"<scene version="3.0.0"><rfilter type="{name}"/></scene>"#);
+            let scene = Description::parse(&text, Path::new("test.xml"), &Options::default()).unwrap();
+            let filter = Filter::build(&scene.root().children(Kind::Filter)[0], &()).unwrap();
+            let n = 4000;
+            let mut integral = 0.0;
+            for i in 0..n {
+                let x = (i as f32 + 0.5) / n as f32 * filter.radius();
+                assert!((filter.eval(x) - filter.eval(-x)).abs() < 1e-6, "{name}");
+                integral += filter.eval(x);
+            }
+            assert!(integral > 0.0 && filter.eval(0.0) >= filter.eval(0.4 * filter.radius()), "{name}");
+            assert_eq!(filter.eval(filter.radius() + 1e-3), 0.0, "{name}");
+        }
+    }
+}

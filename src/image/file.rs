@@ -1,0 +1,151 @@
+//! Files that are there whole or not at all: the bytes go to a temporary file in the target's folder,
+//! reach the disk, and then take the target's name in one step. After any failure the old file, if there
+//! was one, is untouched and nothing new is left behind.
+
+use std::fs::{self, File};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use tempfile::NamedTempFile;
+
+use crate::error::{Error, Result};
+
+/// Writes `bytes` as the file `path`.
+pub(super) fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
+    let target = resolve(path)?;
+    let refused = |cause: &std::io::Error| Error::system("write", path, cause);
+    let mut file = temporary_beside(&target).map_err(|e| refused(&e))?;
+    file.write_all(bytes).map_err(|e| refused(&e))?;
+    file.as_file().sync_all().map_err(|e| refused(&e))?;
+    file.persist(&target).map_err(|e| refused(&e.error))?;
+    // The new name must reach the disk too. Some file systems cannot sync a folder; the file itself is
+    // whole either way, so that is no failure of the write.
+    if let Ok(folder) = File::open(folder_of(&target)) {
+        folder.sync_all().ok();
+    }
+    Ok(())
+}
+
+/// Finds out, without leaving anything behind, whether `path` could be written.
+pub(super) fn check_writable(path: &Path) -> Result<()> {
+    let target = resolve(path)?;
+    temporary_beside(&target)
+        .map(drop)
+        .map_err(|e| Error::system("write", path, &e))
+}
+
+/// The file that `path` names, links followed, after checking that it can be replaced.
+fn resolve(path: &Path) -> Result<PathBuf> {
+    let folder = folder_of(path);
+    if !folder.is_dir() {
+        let folder = folder.display();
+        return Err(Error::input(format!("folder {folder} does not exist")).help("create it"));
+    }
+    let Ok(there) = fs::metadata(path) else {
+        return Ok(path.to_path_buf());
+    };
+    let name = path.display();
+    if there.is_dir() {
+        return Err(
+            Error::input(format!("{name} is a folder")).help("give the name of a file in it")
+        );
+    }
+    if !there.is_file() {
+        return Err(Error::input(format!("{name} is not a regular file")));
+    }
+    if there.permissions().readonly() {
+        return Err(Error::input(format!("{name} is read-only"))
+            .help("make it writable or choose another name"));
+    }
+    fs::canonicalize(path).map_err(|e| Error::system("write", path, &e))
+}
+
+fn folder_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    }
+}
+
+fn temporary_beside(target: &Path) -> std::io::Result<NamedTempFile> {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".etendue-");
+    #[cfg(unix)]
+    {
+        // What any program asks for a new file; the user's umask takes its share.
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(fs::Permissions::from_mode(0o666));
+    }
+    builder.tempfile_in(folder_of(target))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn entries(folder: &Path) -> Vec<String> {
+        let mut names: Vec<String> = fs::read_dir(folder)
+            .unwrap()
+            .map(|e| e.unwrap().file_name().into_string().unwrap())
+            .collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn a_file_is_replaced_whole_and_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.exr");
+        write_atomically(&path, b"first, and longer").unwrap();
+        write_atomically(&path, b"second").unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"second");
+        assert_eq!(entries(folder.path()), ["a.exr"]);
+    }
+
+    #[test]
+    fn what_cannot_be_replaced_is_refused_and_nothing_is_left_behind() {
+        let folder = tempfile::tempdir().unwrap();
+        let read_only = folder.path().join("locked.exr");
+        fs::write(&read_only, b"old").unwrap();
+        let mut permissions = fs::metadata(&read_only).unwrap().permissions();
+        permissions.set_readonly(true);
+        fs::set_permissions(&read_only, permissions).unwrap();
+        let subfolder = folder.path().join("sub.exr");
+        fs::create_dir(&subfolder).unwrap();
+        let missing = folder.path().join("none/a.exr");
+        for (path, message) in [
+            (&read_only, "is read-only"),
+            (&subfolder, "is a folder"),
+            (&missing, "does not exist; create it"),
+        ] {
+            for error in [
+                check_writable(path).unwrap_err(),
+                write_atomically(path, b"new").unwrap_err(),
+            ] {
+                assert!(error.to_string().contains(message), "{error}");
+            }
+        }
+        assert_eq!(fs::read(&read_only).unwrap(), b"old");
+        assert_eq!(entries(folder.path()), ["locked.exr", "sub.exr"]);
+    }
+
+    #[test]
+    fn checking_leaves_nothing_behind() {
+        let folder = tempfile::tempdir().unwrap();
+        check_writable(&folder.path().join("a.exr")).unwrap();
+        assert!(entries(folder.path()).is_empty());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_stays_a_link_and_a_device_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let (real, link) = (folder.path().join("real.exr"), folder.path().join("l.exr"));
+        fs::write(&real, b"old").unwrap();
+        std::os::unix::fs::symlink(&real, &link).unwrap();
+        write_atomically(&link, b"new").unwrap();
+        assert_eq!(fs::read(&real).unwrap(), b"new");
+        assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+        assert!(check_writable(Path::new("/dev/null")).is_err());
+    }
+}

@@ -1,0 +1,78 @@
+//! Which format a file has: on reading its first bytes decide, as names lie, and only TGA, which has no
+//! mark, goes by its name; on writing the extension decides.
+
+use std::path::Path;
+
+use ::image::ImageFormat;
+
+use super::openexr;
+use crate::error::{Error, Result};
+
+/// A file format that can be written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// OpenEXR, any channels, float32.
+    Exr,
+    /// Radiance RGBE.
+    Hdr,
+    /// PNG, 8 bits a channel.
+    Png,
+}
+
+impl Format {
+    /// The format that the extension of `path` asks for.
+    ///
+    /// # Errors
+    /// For any extension but `.exr`, `.hdr` and `.png`, in whatever case.
+    pub fn of_output(path: &Path) -> Result<Self> {
+        match extension(path).as_str() {
+            "exr" => Ok(Self::Exr),
+            "hdr" => Ok(Self::Hdr),
+            "png" => Ok(Self::Png),
+            other => {
+                let name = path.display();
+                let message = if other.is_empty() {
+                    format!("the image name {name} has no extension")
+                } else {
+                    format!("the image name {name} has the unknown extension .{other}")
+                };
+                Err(Error::input(message).help("use .exr, .hdr or .png"))
+            }
+        }
+    }
+}
+
+/// The decoder for a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Decoder {
+    Exr,
+    Raster(ImageFormat),
+}
+
+impl Decoder {
+    pub(super) fn of_input(path: &Path, bytes: &[u8]) -> Result<Self> {
+        let marks: [(&[u8], Decoder); 5] = [
+            (&openexr::MAGIC, Self::Exr),
+            (b"\x89PNG\r\n\x1a\n", Self::Raster(ImageFormat::Png)),
+            (b"\xff\xd8\xff", Self::Raster(ImageFormat::Jpeg)),
+            (b"BM", Self::Raster(ImageFormat::Bmp)),
+            (b"#?", Self::Raster(ImageFormat::Hdr)),
+        ];
+        for (mark, decoder) in marks {
+            if bytes.starts_with(mark) {
+                return Ok(decoder);
+            }
+        }
+        if extension(path) == "tga" {
+            return Ok(Self::Raster(ImageFormat::Tga));
+        }
+        Err(Error::input("the file is no image of a known format")
+            .help("EXR, HDR, PNG, JPEG, BMP and TGA are known"))
+    }
+}
+
+fn extension(path: &Path) -> String {
+    path.extension()
+        .map(|e| e.to_string_lossy().to_lowercase())
+        .unwrap_or_default()
+}

@@ -1,0 +1,245 @@
+//! Reading OpenEXR: every part's every channel, as half, float or unsigned integer, in its full
+//! resolution, into one interleaved image. Colours come first (R, G, B, A or X, Y, Z), then the channels
+//! in the file's order. The header is checked against the file's length before a pixel is allocated.
+
+use std::collections::HashSet;
+use std::io::Cursor;
+
+use ::exr::block::chunk::Chunk;
+use ::exr::block::reader::ChunksReader;
+use ::exr::block::{self, UncompressedBlock};
+use ::exr::meta::header::Header;
+use ::exr::prelude::{AttributeValue, Compression, SampleType, Vec2, f16};
+use rayon::prelude::*;
+
+use super::{WORLD_TO_CAMERA, WORLD_TO_NDC, batch_length};
+use crate::error::{Error, Result};
+use crate::image::{Encoding, Image, Limits, Picture};
+
+/// The first bytes of every OpenEXR file.
+pub(crate) const MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
+
+/// Decodes the bytes of an OpenEXR file.
+pub(crate) fn decode(bytes: &[u8], limits: &Limits) -> Result<Picture> {
+    let reader = block::read(Cursor::new(bytes), false).map_err(refused)?;
+    let headers = reader.headers().to_vec();
+    check_size(&headers, bytes.len(), limits)?;
+
+    let channels = Channels::of(&headers)?;
+    let Vec2(width, height) = headers[0].layer_size;
+    let mut image = Image::try_new(width as u32, height as u32, channels.names.clone())?;
+
+    let full = Vec2(0, 0);
+    let mut chunks = reader
+        .filter_chunks(false, |_, _, block| block.level == full)
+        .map_err(refused)?;
+    let meta = chunks.meta_data().clone();
+    let largest = headers.iter().map(block_bytes).max().unwrap_or(1);
+    let batch = batch_length(largest);
+    let mut seen = HashSet::new();
+    loop {
+        let compressed: Vec<Chunk> = chunks
+            .by_ref()
+            .take(batch)
+            .collect::<::exr::error::Result<_>>()
+            .map_err(refused)?;
+        if compressed.is_empty() {
+            break;
+        }
+        let blocks: Vec<UncompressedBlock> = compressed
+            .into_par_iter()
+            .map(|chunk| UncompressedBlock::decompress_chunk(chunk, &meta, false))
+            .collect::<::exr::error::Result<_>>()
+            .map_err(refused)?;
+        for block in blocks {
+            // As many blocks as the image has are read; if none comes twice, none is missing.
+            if block.index.level != full
+                || !seen.insert((block.index.layer, block.index.pixel_position))
+            {
+                return Err(Error::input("invalid: offset table"));
+            }
+            let header = &headers[block.index.layer];
+            channels.place(&block, header, &mut image);
+        }
+    }
+    Ok(Picture {
+        image,
+        encoding: Encoding::Linear,
+        metadata: metadata(&headers[0]),
+    })
+}
+
+fn refused(error: ::exr::error::Error) -> Error {
+    match error {
+        ::exr::error::Error::NotSupported(what) => Error::unsupported(what.into_owned()),
+        ::exr::error::Error::Io(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => {
+            Error::input("the file ends too early")
+        }
+        other => Error::input(other.to_string()),
+    }
+}
+
+/// The bytes of one block of this part, as large as blocks can be within its window.
+fn block_bytes(header: &Header) -> usize {
+    let Vec2(width, height) = header.max_block_pixel_size();
+    let Vec2(full_width, full_height) = header.layer_size;
+    (width.min(full_width))
+        .saturating_mul(height.min(full_height))
+        .saturating_mul(header.channels.bytes_per_pixel)
+}
+
+/// Refuses headers that claim more pixels than the file can hold or the limit allows.
+fn check_size(headers: &[Header], file_bytes: usize, limits: &Limits) -> Result<()> {
+    let mut samples = 0_u128;
+    let mut coded = 0_u128;
+    let mut chunks = 0_u128;
+    for header in headers {
+        let Vec2(width, height) = header.layer_size;
+        if width == 0 || height == 0 {
+            return Err(Error::input("invalid: the data window is empty"));
+        }
+        let pixels = width as u128 * height as u128;
+        let bytes = pixels * header.channels.bytes_per_pixel as u128;
+        samples += pixels * header.channels.list.len() as u128;
+        chunks += header.chunk_count as u128;
+        // Deflate packs at most 1032 bytes into one and is the tightest of the lossless codes. B44 knows
+        // no ratio above 11; DWA may leave one deflated half a block of 8 × 8 pixels.
+        coded += match header.compression {
+            Compression::Uncompressed => bytes,
+            Compression::DWAA(_) | Compression::DWAB(_) => bytes / (1100 * 256),
+            _ => bytes / 1400,
+        };
+    }
+    let Vec2(width, height) = headers[0].layer_size;
+    // Each block takes an entry of 8 bytes in the offset table.
+    if chunks * 8 + coded > file_bytes as u128 {
+        return Err(Error::input(format!(
+            "invalid: a file of {file_bytes} bytes cannot hold {width} × {height} pixels"
+        )));
+    }
+    limits.check(width as u64, height as u64, samples.saturating_mul(4))
+}
+
+/// Which sample of the image each channel of the file becomes.
+struct Channels {
+    names: Vec<String>,
+    /// By part and by channel of the part.
+    slots: Vec<Vec<usize>>,
+}
+
+impl Channels {
+    fn of(headers: &[Header]) -> Result<Self> {
+        let mut named = Vec::new();
+        for (part, header) in headers.iter().enumerate() {
+            if header.layer_size != headers[0].layer_size
+                || header.own_attributes.layer_position != headers[0].own_attributes.layer_position
+            {
+                return Err(Error::unsupported(
+                    "the parts of the file have different data windows",
+                ));
+            }
+            let layer = (headers.len() > 1)
+                .then_some(header.own_attributes.layer_name.as_ref())
+                .flatten()
+                .map(|name| String::from_utf8_lossy(name.as_slice()).into_owned())
+                .filter(|name| !name.is_empty());
+            for (channel, description) in header.channels.list.iter().enumerate() {
+                let name = String::from_utf8_lossy(description.name.as_slice()).into_owned();
+                let name = match &layer {
+                    Some(layer) if !name.starts_with(&format!("{layer}.")) => {
+                        format!("{layer}.{name}")
+                    }
+                    _ => name,
+                };
+                named.push((name, part, channel));
+            }
+        }
+        // A stable sort: within a rank the file's order stays.
+        named.sort_by_key(|(name, ..)| rank(name));
+        let mut slots: Vec<Vec<usize>> = headers
+            .iter()
+            .map(|h| vec![0; h.channels.list.len()])
+            .collect();
+        for (slot, &(_, part, channel)) in named.iter().enumerate() {
+            slots[part][channel] = slot;
+        }
+        let names = named.into_iter().map(|(name, ..)| name).collect();
+        Ok(Self { names, slots })
+    }
+
+    /// Copies a block's samples into the image.
+    fn place(&self, block: &UncompressedBlock, header: &Header, image: &mut Image) {
+        let stride = self.names.len();
+        let width = image.width() as usize;
+        let slots = &self.slots[block.index.layer];
+        for line in block.lines(&header.channels) {
+            let Vec2(x, y) = line.location.position;
+            let first = (y * width + x) * stride + slots[line.location.channel];
+            let samples = image.data_mut()[first..].iter_mut().step_by(stride);
+            match header.channels.list[line.location.channel].sample_type {
+                SampleType::F16 => copy(samples, line.value, |b| f16::from_ne_bytes(b).to_f32()),
+                SampleType::F32 => copy(samples, line.value, f32::from_ne_bytes),
+                SampleType::U32 => copy(samples, line.value, |b| u32::from_ne_bytes(b) as f32),
+            }
+        }
+    }
+}
+
+/// Converts `N` bytes a sample.
+fn copy<'a, const N: usize>(
+    samples: impl Iterator<Item = &'a mut f32>,
+    bytes: &[u8],
+    convert: impl Fn([u8; N]) -> f32,
+) {
+    let (values, _) = bytes.as_chunks::<N>();
+    for (sample, &value) in samples.zip(values) {
+        *sample = convert(value);
+    }
+}
+
+/// Where a channel stands: the main colours first, as they are spoken.
+fn rank(name: &str) -> usize {
+    ["R", "G", "B", "X", "Y", "Z", "A"]
+        .iter()
+        .position(|&main| main == name)
+        .unwrap_or(usize::MAX)
+}
+
+/// The attributes that are no matter of the file's structure, by name.
+fn metadata(header: &Header) -> Vec<(String, String)> {
+    let numbers = |values: &[f32]| {
+        let texts: Vec<String> = values.iter().map(f32::to_string).collect();
+        texts.join(" ")
+    };
+    let mut entries: Vec<(String, String)> = header
+        .all_named_attributes()
+        .filter_map(|(name, value)| {
+            let name = String::from_utf8_lossy(name);
+            let text = match value {
+                AttributeValue::Text(text) => String::from_utf8_lossy(text.as_slice()).into_owned(),
+                AttributeValue::F32(v) => v.to_string(),
+                AttributeValue::F64(v) => v.to_string(),
+                AttributeValue::I32(v) if name != "chunkCount" => v.to_string(),
+                AttributeValue::FloatVec2(Vec2(x, y)) => numbers(&[x, y]),
+                AttributeValue::Matrix4x4(rows) => numbers(&rows),
+                AttributeValue::Chromaticities(c) => {
+                    let [r, g, b, w] = [c.red, c.green, c.blue, c.white];
+                    numbers(&[r.0, r.1, g.0, g.1, b.0, b.1, w.0, w.1])
+                }
+                AttributeValue::IntegerBounds(b) => format!(
+                    "{} {} {} {}",
+                    b.position.0, b.position.1, b.size.0, b.size.1
+                ),
+                _ => return None,
+            };
+            let name = match &*name {
+                n if n == WORLD_TO_CAMERA.1 => WORLD_TO_CAMERA.0,
+                n if n == WORLD_TO_NDC.1 => WORLD_TO_NDC.0,
+                n => n,
+            };
+            Some((name.to_owned(), text))
+        })
+        .collect();
+    entries.sort();
+    entries
+}

@@ -1,0 +1,311 @@
+//! What is written is read again, in every format, and so is every image of the shared scenes.
+
+use std::fs;
+use std::path::PathBuf;
+
+use ::image::{ExtendedColorType, ImageFormat};
+use glam::Mat4;
+
+use super::*;
+use crate::error::Kind;
+
+fn in_file<T>(name: &str, test: impl FnOnce(&Path) -> T) -> T {
+    let folder = tempfile::tempdir().unwrap();
+    let result = test(&folder.path().join(name));
+    assert!(fs::read_dir(folder.path()).unwrap().count() <= 1);
+    result
+}
+
+fn text<'a>(picture: &'a Picture, name: &str) -> Option<&'a str> {
+    let entry = picture.metadata.iter().find(|(n, _)| n == name);
+    entry.map(|(_, text)| text.as_str())
+}
+
+#[test]
+fn exr_keeps_every_bit_of_every_channel() {
+    let names = [
+        "R", "G", "B", "A", "albedo.B", "albedo.G", "albedo.R", "depth",
+    ];
+    for (width, height) in [(1, 1), (7, 5), (64, 33), (3, 200)] {
+        let mut image = sample(width, height, &names);
+        let odd = [f32::NAN, f32::INFINITY, -0.0, -1e30, 1e-40, f32::MAX];
+        let n = image.data().len().min(odd.len());
+        image.data_mut()[..n].copy_from_slice(&odd[..n]);
+        let back = in_file("a.exr", |path| {
+            write(path, &image, &Metadata::default()).unwrap();
+            read(path, &Limits::default()).unwrap()
+        });
+        assert_eq!(back.encoding, Encoding::Linear);
+        assert_eq!(back.image.channels(), image.channels());
+        let bits = |i: &Image| i.data().iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+        assert_eq!(bits(&back.image), bits(&image), "{width} × {height}");
+    }
+}
+
+#[test]
+fn exr_channels_may_come_in_any_order_and_go_out_colours_first() {
+    let image = sample(4, 3, &["depth", "B", "A", "R", "G"]);
+    let back = decode(Path::new("a.exr"), &exr_bytes(&image), &Limits::default()).unwrap();
+    assert_eq!(back.image.channels(), ["R", "G", "B", "A", "depth"]);
+    for (c, name) in back.image.channels().iter().enumerate() {
+        let original = image.channel(name).unwrap();
+        assert_eq!(back.image.get(3, 2, c), image.get(3, 2, original));
+    }
+}
+
+#[test]
+fn exr_keeps_its_metadata_in_types_of_their_own() {
+    let camera = Mat4::from_translation(glam::Vec3::new(1.0, 2.0, 3.0));
+    let metadata = Metadata::default()
+        .with("software", "étendue")
+        .with("integrator", "path")
+        .with("samples", 64_u32)
+        .with("seed", i64::MAX)
+        .with("seconds", 0.1_f64)
+        .with("exposure", 0.25_f32)
+        .with("world_to_camera", camera)
+        .with("world_to_ndc", Mat4::IDENTITY);
+    let image = sample(2, 2, &["Y"]);
+    let bytes = openexr::encode(&image, &whole(&image), &metadata).unwrap();
+    let back = decode(Path::new("a.exr"), &bytes, &Limits::default()).unwrap();
+    for (name, value) in [
+        ("software", "étendue"),
+        ("integrator", "path"),
+        ("samples", "64"),
+        ("seed", "9223372036854775807"),
+        ("seconds", "0.1"),
+        ("exposure", "0.25"),
+        // OpenEXR multiplies row vectors: the translation stands in the last row.
+        ("world_to_camera", "1 0 0 0 0 1 0 0 0 0 1 0 1 2 3 1"),
+        ("world_to_ndc", "1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1"),
+    ] {
+        assert_eq!(text(&back, name), Some(value), "{name}");
+    }
+}
+
+#[test]
+fn exr_files_of_equal_images_are_equal() {
+    let image = sample(40, 40, &["R", "G", "B"]);
+    let file = || {
+        let entries = (0..20).map(|i| (format!("entry{i}"), MetaValue::Integer(i)));
+        let metadata = Metadata {
+            entries: entries.collect(),
+        };
+        openexr::encode(&image, &whole(&image), &metadata).unwrap()
+    };
+    let first = file();
+    assert!((0..8).all(|_| file() == first));
+}
+
+#[test]
+fn exr_says_where_a_crop_lies() {
+    let image = sample(5, 4, &["R", "G", "B"]);
+    let window = Window {
+        x: 3,
+        y: 20,
+        full_width: 32,
+        full_height: 24,
+    };
+    let back = in_file("crop.exr", |path| {
+        write_window(path, &image, &window, &Metadata::default()).unwrap();
+        read(path, &Limits::default()).unwrap()
+    });
+    assert_eq!(back.image, image);
+    assert_eq!(text(&back, "dataWindow"), Some("3 20 5 4"));
+    assert_eq!(text(&back, "displayWindow"), Some("0 0 32 24"));
+    let beyond = Window { y: 21, ..window };
+    assert!(openexr::encode(&image, &beyond, &Metadata::default()).is_err());
+}
+
+#[test]
+fn exr_refuses_names_that_would_break_the_file() {
+    let long = "x".repeat(256);
+    for names in [&["R", "R"][..], &[""], &["a\0b"], &[&long]] {
+        let image = sample(1, 1, names);
+        let result = openexr::encode(&image, &whole(&image), &Metadata::default());
+        assert!(result.is_err(), "{names:?}");
+    }
+    let image = sample(1, 1, &["Y"]);
+    for name in ["channels", "dataWindow", "", "a\0b", &long] {
+        let metadata = Metadata::default().with(name, 1_u32);
+        let result = openexr::encode(&image, &whole(&image), &metadata);
+        assert!(result.is_err(), "{name:?}");
+    }
+    let twice = Metadata::default().with("a", 1_u32).with("a", "b");
+    assert!(openexr::encode(&image, &whole(&image), &twice).is_err());
+    let image = sample(2, 2, &["a_layer_with_a_long_name.and_a_channel"]);
+    let back = decode(Path::new("a.exr"), &exr_bytes(&image), &Limits::default()).unwrap();
+    assert_eq!(back.image, image);
+}
+
+#[test]
+fn hdr_keeps_colours_to_a_hundredth_of_the_brightest() {
+    for width in [1, 7, 8, 200] {
+        let mut image = sample(width, 3, &["R", "G", "B"]);
+        image
+            .pixel_mut(0, 0)
+            .copy_from_slice(&[f32::NAN, -1.0, 0.0]);
+        let back = in_file("a.hdr", |path| {
+            write(path, &image, &Metadata::default()).unwrap();
+            read(path, &Limits::default()).unwrap()
+        });
+        assert_eq!(back.encoding, Encoding::Linear);
+        assert_eq!(back.image.pixel(0, 0), [0.0; 3]);
+        let pixels = |i: &Image| {
+            i.data()
+                .chunks(3)
+                .skip(1)
+                .map(<[f32]>::to_vec)
+                .collect::<Vec<_>>()
+        };
+        for (old, new) in pixels(&image).iter().zip(pixels(&back.image)) {
+            let brightest = old.iter().fold(0.0_f32, |a, &b| a.max(b));
+            assert!((0..3).all(|c| (old[c] - new[c]).abs() <= 0.01 * brightest));
+        }
+    }
+}
+
+#[test]
+fn hdr_survives_the_ends_of_its_range() {
+    let mut image = sample(8, 1, &["Y"]);
+    let odd = [
+        f32::INFINITY,
+        f32::MAX,
+        1e38,
+        1e-38,
+        1e-40,
+        f32::NAN,
+        -5.0,
+        1.0,
+    ];
+    image.data_mut().copy_from_slice(&odd);
+    let bytes = radiance::encode(&image).unwrap();
+    let back = decode(Path::new("a.hdr"), &bytes, &Limits::default()).unwrap();
+    let values: Vec<f32> = back.image.view().row(0, 0).collect();
+    assert!(values[..3].iter().all(|&v| v > 0.9e38), "{values:?}");
+    assert_eq!(values[4..], [0.0, 0.0, 0.0, 1.0]);
+}
+
+#[test]
+fn png_codes_come_back_unchanged() {
+    for layout in [Layout::Grey, Layout::GreyAlpha, Layout::Rgb, Layout::Rgba] {
+        let n = 16 * 16 * layout.channels();
+        let data: Vec<u8> = (0..n).map(|i| (i % 256) as u8).collect();
+        let codes = Codes::new(16, 16, layout, data.clone()).unwrap();
+        let back = in_file("a.png", |path| {
+            write_codes(path, &codes).unwrap();
+            read(path, &Limits::default()).unwrap()
+        });
+        assert_eq!(back.encoding, Encoding::Srgb);
+        let values: Vec<f32> = data.iter().map(|&v| f32::from(v) / 255.0).collect();
+        assert_eq!(back.image.data(), values, "{layout:?}");
+    }
+}
+
+#[test]
+fn integers_of_8_and_16_bits_become_code_values() {
+    for (color, names, most) in [
+        (ExtendedColorType::L8, &["Y"][..], 255.0),
+        (ExtendedColorType::La8, &["Y", "A"], 255.0),
+        (ExtendedColorType::Rgba8, &["R", "G", "B", "A"], 255.0),
+        (ExtendedColorType::L16, &["Y"], 65535.0),
+        (ExtendedColorType::La16, &["Y", "A"], 65535.0),
+        (ExtendedColorType::Rgb16, &["R", "G", "B"], 65535.0),
+        (ExtendedColorType::Rgba16, &["R", "G", "B", "A"], 65535.0),
+    ] {
+        let bytes = raster_bytes(9, 5, color, ImageFormat::Png);
+        let picture = decode(Path::new("a.png"), &bytes, &Limits::default()).unwrap();
+        assert_eq!(picture.image.channels(), names);
+        let first = if most == 255.0 {
+            37.0 / 255.0
+        } else {
+            f32::from(u16::from_ne_bytes([74, 111])) / 65535.0
+        };
+        assert_eq!(picture.image.data()[1], first, "{color:?}");
+    }
+}
+
+#[test]
+fn the_content_decides_and_not_the_name() {
+    for format in [ImageFormat::Png, ImageFormat::Jpeg, ImageFormat::Bmp] {
+        let bytes = raster_bytes(9, 5, ExtendedColorType::Rgb8, format);
+        let picture = decode(Path::new("a.exr"), &bytes, &Limits::default()).unwrap();
+        assert_eq!((picture.image.width(), picture.image.height()), (9, 5));
+    }
+    let tga = raster_bytes(9, 5, ExtendedColorType::Rgb8, ImageFormat::Tga);
+    assert!(decode(Path::new("a.TGA"), &tga, &Limits::default()).is_ok());
+    assert!(decode(Path::new("a.dat"), &tga, &Limits::default()).is_err());
+}
+
+#[test]
+fn what_cannot_be_written_is_known_before_the_render() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, message) in [
+        ("a", "has no extension"),
+        ("a.tiff", "use .exr, .hdr or .png"),
+        ("none/a.exr", "does not exist"),
+    ] {
+        let path = folder.path().join(name);
+        let error = check_writable(&path).unwrap_err();
+        assert!(error.to_string().contains(message), "{error}");
+        let image = sample(1, 1, &["Y"]);
+        assert!(write(&path, &image, &Metadata::default()).is_err());
+    }
+    check_writable(&folder.path().join("a.PNG")).unwrap();
+    let colourless = sample(1, 1, &["depth"]);
+    let path = folder.path().join("a.hdr");
+    assert!(write(&path, &colourless, &Metadata::default()).is_err());
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+}
+
+#[test]
+fn every_image_of_the_shared_scenes_can_be_read() {
+    let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data"));
+    let mut read_images = 0;
+    for path in images_below(root) {
+        let result = read(&path, &Limits::default());
+        if path.ends_with("XYZ_YC.exr") {
+            // Its colours have half the resolution of its luminance, which the crate exr does not know.
+            assert_eq!(result.unwrap_err().problems()[0].kind, Kind::Unsupported);
+            continue;
+        }
+        let picture = result.unwrap_or_else(|e| panic!("{e}"));
+        assert!(picture.image.width() > 0 && !picture.image.channels().is_empty());
+        let linear = path.extension().is_some_and(|e| e == "exr");
+        assert_eq!(
+            picture.encoding == Encoding::Linear,
+            linear,
+            "{}",
+            path.display()
+        );
+        read_images += 1;
+    }
+    if read_images == 0 {
+        use std::io::Write;
+        let _ = writeln!(
+            std::io::stderr(),
+            "skipped: no images in {}",
+            root.display()
+        );
+    }
+}
+
+fn images_below(folder: &Path) -> Vec<PathBuf> {
+    let Ok(entries) = fs::read_dir(folder) else {
+        return Vec::new();
+    };
+    let mut images = Vec::new();
+    for path in entries.map(|e| e.unwrap().path()) {
+        let extension = path
+            .extension()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .to_lowercase();
+        if path.is_dir() {
+            images.extend(images_below(&path));
+        } else if ["exr", "jpg", "png", "bmp", "tga", "hdr"].contains(&&*extension) {
+            images.push(path);
+        }
+    }
+    images
+}

@@ -1,0 +1,13 @@
+//! Mathematics that everything above stands on: random numbers that are a pure function of where they
+//! are used, frames, transforms, warps of the unit square, discrete distributions and the offset that
+//! keeps a ray from hitting the surface it leaves.
+
+pub mod distribution;
+pub mod frame;
+pub mod offset;
+pub mod random;
+pub mod transform;
+pub mod warp;
+
+pub use frame::Frame;
+pub use transform::Transform;

@@ -1,0 +1,104 @@
+//! Counter-based random numbers: each is a hash of (seed, pixel, sample, dimension) and of nothing else,
+//! so that an image does not depend on threads, tiles, order or crop. The hash is the finaliser of
+//! SplitMix64 (Steele, Lea and Flood, *Fast splittable pseudorandom number generators*, 2014, with
+//! Stafford's "variant 13" constants); numbers along a key are the SplitMix64 sequence that starts there.
+
+/// The golden ratio's fraction in 64 bits, SplitMix64's step.
+const STEP: u64 = 0x9e37_79b9_7f4a_7c15;
+
+/// A bijection of 64 bits that lets every input bit reach every output bit.
+#[inline]
+pub fn mix(mut x: u64) -> u64 {
+    x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    x ^ (x >> 31)
+}
+
+/// A key below `key`, one for each `index`.
+#[inline]
+pub fn key(key: u64, index: u64) -> u64 {
+    mix(key ^ mix(index.wrapping_add(STEP)))
+}
+
+/// 64 random bits, the `dimension`-th along `key`.
+#[inline]
+pub fn bits(key: u64, dimension: u32) -> u64 {
+    mix(key.wrapping_add(STEP.wrapping_mul(u64::from(dimension) + 1)))
+}
+
+/// A number in [0, 1), uniform on multiples of 2⁻²⁴.
+#[inline]
+pub fn unit(bits: u64) -> f32 {
+    (bits >> 40) as f32 * (1.0 / 16_777_216.0)
+}
+
+/// Where index `i` of `n` goes in the permutation of 0..n that `key` selects; `i < n`.
+///
+/// Kensler, *Correlated multi-jittered sampling* (2013): a bijection of the next power of two, walked
+/// until it lands inside the range.
+#[inline]
+pub fn permute(mut i: u32, n: u32, key: u64) -> u32 {
+    debug_assert!(i < n);
+    if n <= 1 {
+        return 0;
+    }
+    let w = u32::MAX >> (n - 1).leading_zeros();
+    let p = (key ^ (key >> 32)) as u32;
+    loop {
+        i ^= p;
+        i = i.wrapping_mul(0xe170_893d);
+        i ^= p >> 16;
+        i ^= (i & w) >> 4;
+        i ^= p >> 8;
+        i = i.wrapping_mul(0x0929_eb3f);
+        i ^= p >> 23;
+        i ^= (i & w) >> 1;
+        i = i.wrapping_mul(1 | p >> 27);
+        i = i.wrapping_mul(0x6935_fa69);
+        i ^= (i & w) >> 11;
+        i = i.wrapping_mul(0x74dc_b303);
+        i ^= (i & w) >> 2;
+        i = i.wrapping_mul(0x9e50_1cc3);
+        i ^= (i & w) >> 2;
+        i = i.wrapping_mul(0xc860_a3df);
+        i &= w;
+        i ^= i >> 5;
+        if i < n {
+            return (((u64::from(i)) + u64::from(p)) % u64::from(n)) as u32;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_along_a_key_are_uniform_and_uncorrelated() {
+        let n = 1 << 16;
+        let mut sum = [0.0f64; 3];
+        for d in 0..n {
+            let a = f64::from(unit(bits(key(7, 3), d))) - 0.5;
+            let b = f64::from(unit(bits(key(7, 3), d + 1))) - 0.5;
+            let c = f64::from(unit(bits(key(7, 4), d))) - 0.5;
+            sum = [sum[0] + a, sum[1] + a * b, sum[2] + a * c];
+        }
+        // Standard deviations: 1/√12 for the mean, 1/12 for the products, each over √n.
+        let scale = f64::from(n).sqrt();
+        assert!(sum[0].abs() / scale < 4.0 * 0.289, "{sum:?}");
+        assert!(sum[1].abs() / scale < 4.0 / 12.0 && sum[2].abs() / scale < 4.0 / 12.0, "{sum:?}");
+    }
+
+    #[test]
+    fn every_key_permutes() {
+        for n in [1, 2, 3, 7, 16, 100, 1000] {
+            for k in 0..20 {
+                let mut seen = vec![false; n as usize];
+                for i in 0..n {
+                    seen[permute(i, n, key(k, 1)) as usize] = true;
+                }
+                assert!(seen.iter().all(|&s| s), "n = {n}, key {k}");
+            }
+        }
+    }
+}

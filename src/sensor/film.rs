@@ -1,0 +1,145 @@
+//! `hdrfilm`: size, crop window, pixel format and reconstruction filter; plain settings, for the sums
+//! themselves are kept by `render`.
+
+use crate::description::{Kind, Properties};
+use crate::error::Result;
+use crate::family;
+use crate::filter::Filter;
+
+/// A rectangle of pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Window {
+    /// Left edge.
+    pub x: u32,
+    /// Upper edge.
+    pub y: u32,
+    /// Pixels across.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+}
+
+impl Window {
+    /// Whether `other` lies inside.
+    pub fn contains(&self, other: &Self) -> bool {
+        let end = |start: u32, size: u32| u64::from(start) + u64::from(size);
+        other.x >= self.x
+            && other.y >= self.y
+            && end(other.x, other.width) <= end(self.x, self.width)
+            && end(other.y, other.height) <= end(self.y, self.height)
+    }
+
+    /// Grown by `border` pixels to each side, but not beyond `limit`.
+    #[must_use]
+    pub fn grown(&self, border: u32, limit: &Self) -> Self {
+        let (x, y) = (self.x.saturating_sub(border).max(limit.x), self.y.saturating_sub(border).max(limit.y));
+        let right = (self.x + self.width + border).min(limit.x + limit.width);
+        let bottom = (self.y + self.height + border).min(limit.y + limit.height);
+        Self { x, y, width: right.saturating_sub(x), height: bottom.saturating_sub(y) }
+    }
+}
+
+/// Which channels the image gets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PixelFormat {
+    /// R, G, B.
+    Rgb,
+    /// R, G, B and A, the fraction of samples that met something.
+    Rgba,
+    /// Y alone.
+    Luminance,
+}
+
+/// The film's settings.
+#[derive(Clone, Debug)]
+pub struct Film {
+    /// Pixels across the full film.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+    /// The part that is rendered.
+    pub crop: Window,
+    /// Channels.
+    pub pixel_format: PixelFormat,
+    /// How samples reach pixels.
+    pub filter: Filter,
+}
+
+impl Default for Film {
+    /// Mitsuba's: 768 × 576.
+    fn default() -> Self {
+        let (width, height) = (768, 576);
+        let crop = Window { x: 0, y: 0, width, height };
+        Self { width, height, crop, pixel_format: PixelFormat::Rgb, filter: Filter::default() }
+    }
+}
+
+/// The most pixels along one side.
+const MAX_SIDE: i64 = 1 << 16;
+/// The most pixels of a crop.
+const MAX_PIXELS: u64 = 1 << 28;
+
+impl Film {
+    /// Width over height, of the full film.
+    pub fn aspect(&self) -> f64 {
+        f64::from(self.width) / f64::from(self.height)
+    }
+
+    /// The whole film.
+    pub fn full(&self) -> Window {
+        Window { x: 0, y: 0, width: self.width, height: self.height }
+    }
+
+    /// From the film inside a sensor.
+    pub fn build(properties: &Properties<'_>) -> Result<Self> {
+        const NAMES: &[&str] = &["hdrfilm"];
+        if properties.plugin() != NAMES[0] {
+            return Err(family::unknown(properties, "film", properties.plugin(), NAMES));
+        }
+        let side = |name: &'static str, default: i64, least: i64| -> Result<u32> {
+            let n = properties.integer(name)?.unwrap_or(default);
+            if !(least..=MAX_SIDE).contains(&n) {
+                return Err(properties.error(name, format!("{n} pixels; {least} to {MAX_SIDE} are possible")));
+            }
+            Ok(n as u32)
+        };
+        let (width, height) = (side("width", 768, 1)?, side("height", 576, 1)?);
+        let crop = Window {
+            x: side("crop_offset_x", 0, 0)?,
+            y: side("crop_offset_y", 0, 0)?,
+            width: side("crop_width", i64::from(width), 1)?,
+            height: side("crop_height", i64::from(height), 1)?,
+        };
+        let full = Window { x: 0, y: 0, width, height };
+        if !full.contains(&crop) {
+            let message = format!(
+                "the crop of {} × {} at ({}, {}) leaves the film of {width} × {height}",
+                crop.width, crop.height, crop.x, crop.y
+            );
+            let name = if properties.has("crop_width") { "crop_width" } else { "crop_offset_x" };
+            return Err(properties.error(name, message));
+        }
+        if u64::from(crop.width) * u64::from(crop.height) > MAX_PIXELS {
+            let message = format!("{} × {} pixels are too many to hold", crop.width, crop.height);
+            return Err(properties.error("width", message).help("render it in crops"));
+        }
+        let pixel_format = match properties.string("pixel_format")?.unwrap_or("rgb") {
+            "rgb" => PixelFormat::Rgb,
+            "rgba" => PixelFormat::Rgba,
+            "luminance" => PixelFormat::Luminance,
+            other => {
+                let error = properties.error("pixel_format", format!("unknown pixel format \"{other}\""));
+                return Err(error.help("there are rgb, rgba and luminance"));
+            }
+        };
+        // How Mitsuba writes its file; what Étendue writes follows from the output's name.
+        for name in ["file_format", "component_format", "banner", "compensate", "sample_border"] {
+            properties.ignore(name);
+        }
+        let filter = match properties.children(Kind::Filter).first() {
+            Some(child) => Filter::build(child, &())?,
+            None => Filter::default(),
+        };
+        Ok(Self { width, height, crop, pixel_format, filter })
+    }
+}

@@ -1,0 +1,85 @@
+//! Sensors: from a place on the film, a point of the lens and a time to a ray.
+
+mod film;
+mod orthographic;
+mod perspective;
+
+use glam::{DMat4, Mat4, Vec2, Vec3};
+
+use crate::description::Properties;
+use crate::error::Result;
+use crate::family::family;
+use crate::interaction::Ray;
+use crate::math::Transform;
+
+pub use film::{Film, PixelFormat, Window};
+
+/// What every sensor does.
+pub trait Camera: std::fmt::Debug + Send + Sync {
+    /// The ray through `film` (in [0, 1]², x to the right and y down over the full film) and the lens
+    /// point `lens` (in [0, 1]²), at `time`.
+    fn ray(&self, film: Vec2, lens: Vec2, time: f32) -> Ray;
+    /// From world to camera space: z forward, y up, x to the image's left.
+    fn world_to_camera(&self) -> Mat4;
+    /// From camera space to clip space: x right and y up in [−1, 1], z in [0, 1] from near to far.
+    fn projection(&self) -> Mat4;
+    /// When the shutter is open: (open, close).
+    fn shutter(&self) -> (f32, f32);
+}
+
+family! {
+    /// Every sensor there is.
+    #[derive(Clone, Debug)]
+    pub enum Sensor: Camera, kind "sensor", context Film {
+        "orthographic" => Orthographic in orthographic,
+        "perspective" => Perspective in perspective,
+    }
+}
+
+/// What all sensors have in common.
+#[derive(Clone, Debug)]
+struct Mount {
+    to_world: Transform,
+    near: f32,
+    far: f32,
+    shutter: (f32, f32),
+}
+
+impl Mount {
+    fn build(properties: &Properties<'_>) -> Result<Self> {
+        let matrix = properties.transform("to_world")?.unwrap_or(DMat4::IDENTITY);
+        let Some(to_world) = Transform::new(&matrix) else {
+            return Err(properties.error("to_world", "the sensor's transform must be affine and invertible"));
+        };
+        let near = properties.float("near_clip")?.unwrap_or(1e-2);
+        let far = properties.float("far_clip")?.unwrap_or(1e4);
+        if !(near > 0.0) {
+            return Err(properties.error("near_clip", format!("near_clip must be positive, and {near} is not")));
+        }
+        if !(far > near) {
+            let message = format!("far_clip ({far}) must be greater than near_clip ({near})");
+            return Err(properties.error("far_clip", message));
+        }
+        let open = properties.float("shutter_open")?.unwrap_or(0.0);
+        let close = properties.float("shutter_close")?.unwrap_or(open);
+        if close < open {
+            let message = format!("shutter_close ({close}) lies before shutter_open ({open})");
+            return Err(properties.error("shutter_close", message));
+        }
+        Ok(Self { to_world, near: near as f32, far: far as f32, shutter: (open as f32, close as f32) })
+    }
+
+    fn world_to_camera(&self) -> Mat4 {
+        let inverse = self.to_world.inverse();
+        Mat4::from_translation(inverse.translation()) * Mat4::from_mat3(inverse.linear())
+    }
+
+    /// The ray from the camera-space point `start` to `end`.
+    fn ray(&self, start: Vec3, end: Vec3, time: f32) -> Ray {
+        let origin = self.to_world.point(start);
+        // Through the linear part: the difference of two far points would cancel.
+        let way = self.to_world.vector(end - start);
+        let length = way.length();
+        Ray { origin, direction: way / length, t_max: length, time }
+    }
+}

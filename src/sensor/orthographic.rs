@@ -1,0 +1,50 @@
+//! `orthographic`: parallel rays; the film covers [−1, 1] in x, and in y what its aspect leaves, both in
+//! the units of `to_world`.
+
+use glam::{Mat4, Vec2, Vec3, Vec4};
+
+use super::{Camera, Film, Mount};
+use crate::description::Properties;
+use crate::error::Result;
+use crate::interaction::Ray;
+
+/// A camera without perspective.
+#[derive(Clone, Debug)]
+pub struct Orthographic {
+    mount: Mount,
+    /// Half the film's extent.
+    half: Vec2,
+}
+
+impl Orthographic {
+    pub(super) fn build(properties: &Properties<'_>, film: &Film) -> Result<Self> {
+        let half = Vec2::new(1.0, 1.0 / film.aspect() as f32);
+        Ok(Self { mount: Mount::build(properties)?, half })
+    }
+}
+
+impl Camera for Orthographic {
+    fn ray(&self, film: Vec2, _lens: Vec2, time: f32) -> Ray {
+        let p = (Vec2::ONE - 2.0 * film) * self.half;
+        self.mount.ray(p.extend(self.mount.near), p.extend(self.mount.far), time)
+    }
+
+    fn world_to_camera(&self) -> Mat4 {
+        self.mount.world_to_camera()
+    }
+
+    fn projection(&self) -> Mat4 {
+        let (near, far) = (self.mount.near, self.mount.far);
+        let scale = Vec3::new(-1.0 / self.half.x, 1.0 / self.half.y, 1.0 / (far - near));
+        Mat4::from_cols(
+            Vec4::new(scale.x, 0.0, 0.0, 0.0),
+            Vec4::new(0.0, scale.y, 0.0, 0.0),
+            Vec4::new(0.0, 0.0, scale.z, 0.0),
+            Vec4::new(0.0, 0.0, -near * scale.z, 1.0),
+        )
+    }
+
+    fn shutter(&self) -> (f32, f32) {
+        self.mount.shutter
+    }
+}

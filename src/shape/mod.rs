@@ -1,0 +1,162 @@
+//! Shapes: what a scene's `<shape>` plugins build. Most build a triangle mesh, some a surface with an
+//! equation of its own; everything above sees a [`Geometry`].
+
+mod mesh;
+mod sphere;
+
+mod cube;
+mod obj;
+mod ply;
+mod rectangle;
+
+use glam::{DMat4, Vec2, Vec3};
+
+use crate::description::{Kind, Properties};
+use crate::error::Result;
+use crate::family;
+use crate::interaction::{Hit, Interaction, Ray};
+use crate::math::Transform;
+
+pub use mesh::TriangleMesh;
+pub use sphere::Sphere;
+
+/// An axis-aligned box.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bounds {
+    /// Smallest coordinates.
+    pub min: Vec3,
+    /// Largest coordinates.
+    pub max: Vec3,
+}
+
+impl Bounds {
+    /// Contains nothing.
+    pub const EMPTY: Self = Self { min: Vec3::INFINITY, max: Vec3::NEG_INFINITY };
+
+    /// The smallest box around both.
+    #[must_use]
+    pub fn union(self, other: Self) -> Self {
+        Self { min: self.min.min(other.min), max: self.max.max(other.max) }
+    }
+
+    /// The smallest box around this and `point`.
+    #[must_use]
+    pub fn with(self, point: Vec3) -> Self {
+        Self { min: self.min.min(point), max: self.max.max(point) }
+    }
+
+    /// A box around the box's image, with room for rounding.
+    #[must_use]
+    pub fn transformed(self, transform: &Transform) -> Self {
+        let mut bounds = Self::EMPTY;
+        for corner in 0..8 {
+            let pick = |bit: u32, low: f32, high: f32| if corner >> bit & 1 == 0 { low } else { high };
+            let p = Vec3::new(
+                pick(0, self.min.x, self.max.x),
+                pick(1, self.min.y, self.max.y),
+                pick(2, self.min.z, self.max.z),
+            );
+            let (image, error) = (transform.point(p), transform.point_error(p, Vec3::ZERO));
+            bounds = bounds.with(image - error).with(image + error);
+        }
+        bounds
+    }
+
+    /// Whether it contains nothing.
+    pub fn is_empty(&self) -> bool {
+        !self.min.cmple(self.max).all()
+    }
+}
+
+/// A point drawn on a surface as seen from another point.
+#[derive(Clone, Copy, Debug)]
+pub struct SurfaceSample {
+    /// World space.
+    pub position: Vec3,
+    /// Unit length, on the side that emits.
+    pub normal: Vec3,
+    /// Texture coordinates.
+    pub uv: Vec2,
+    /// Density per solid angle at the other point, in 1/sr.
+    pub pdf: f32,
+}
+
+/// What every kind of geometry does. Triangles are intersected by `accel` itself, never one by one
+/// through this trait.
+pub trait Surface: std::fmt::Debug + Send + Sync {
+    /// How many primitives it has.
+    fn primitive_count(&self) -> u32;
+    /// A box that contains a primitive's every hit.
+    fn bounds(&self, primitive: u32) -> Bounds;
+    /// (t, u, v) of a primitive's first hit with 0 < t ≤ `t_max`.
+    fn intersect(&self, primitive: u32, ray: &Ray) -> Option<(f32, f32, f32)>;
+    /// What a hit looks like; `hit` came from this surface and `ray`.
+    fn interaction(&self, ray: &Ray, hit: &Hit) -> Interaction<'_>;
+    /// In square units of the scene.
+    fn area(&self) -> f64;
+    /// A point drawn on the surface for light at `from`; `None` where none can be.
+    fn sample(&self, from: Vec3, u: Vec2) -> Option<SurfaceSample>;
+    /// The density with which [`Surface::sample`] would have drawn the point `at`, which is visible
+    /// from `from`.
+    fn pdf(&self, from: Vec3, at: &Interaction<'_>) -> f32;
+    /// Bytes held.
+    fn bytes(&self) -> usize;
+}
+
+/// A surface, whatever its plugin.
+#[derive(Debug)]
+pub enum Geometry {
+    /// Triangles.
+    Mesh(TriangleMesh),
+    /// A sphere.
+    Sphere(Sphere),
+}
+
+impl std::ops::Deref for Geometry {
+    type Target = dyn Surface;
+
+    fn deref(&self) -> &Self::Target {
+        match self {
+            Self::Mesh(mesh) => mesh,
+            Self::Sphere(sphere) => sphere,
+        }
+    }
+}
+
+type Build = fn(&Properties<'_>) -> Result<Geometry>;
+
+/// The shape plugins.
+const PLUGINS: &[(&str, Build)] = &[
+    ("cube", cube::build),
+    ("obj", obj::build),
+    ("ply", ply::build),
+    ("rectangle", rectangle::build),
+    ("sphere", sphere::build),
+];
+
+/// The names of the plugins, as scene files write them.
+pub fn names() -> Vec<&'static str> {
+    PLUGINS.iter().map(|(name, _)| *name).collect()
+}
+
+/// Builds the geometry that `properties` names, in world space.
+pub fn build(properties: &Properties<'_>) -> Result<Geometry> {
+    debug_assert_eq!(properties.kind(), Kind::Shape);
+    match PLUGINS.iter().find(|(name, _)| *name == properties.plugin()) {
+        Some((_, build)) => build(properties),
+        None => Err(family::unknown(properties, "shape", properties.plugin(), &names())),
+    }
+}
+
+/// The property `to_world`, the identity by default.
+fn to_world(properties: &Properties<'_>) -> Result<DMat4> {
+    Ok(properties.transform("to_world")?.unwrap_or(DMat4::IDENTITY))
+}
+
+/// Density per solid angle of a point drawn with density 1/`area` over a surface.
+fn area_to_solid_angle(area: f64, from: Vec3, position: Vec3, normal: Vec3) -> f32 {
+    let way = position - from;
+    let squared = way.length_squared();
+    let cosine = normal.dot(way).abs() / squared.sqrt();
+    if cosine > 0.0 { (f64::from(squared) / (f64::from(cosine) * area)) as f32 } else { 0.0 }
+}

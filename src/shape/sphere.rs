@@ -1,0 +1,176 @@
+//! `sphere`: centre, radius and `to_world` (rotation and uniform scale). Texture coordinates are
+//! (φ/2π, θ/π) about the local z axis. The quadratic is solved in double precision, so that small and
+//! distant spheres keep their shape. Seen from outside, light samples are uniform over the cone that the
+//! sphere fills (Shirley, Wang and Zimmerman, *Monte Carlo techniques for direct lighting*, 1996).
+
+use std::f32::consts::{FRAC_1_PI, PI, TAU};
+
+use glam::{DVec3, Mat3, Vec2, Vec3};
+
+use super::{Bounds, Geometry, Surface, SurfaceSample, area_to_solid_angle, to_world};
+use crate::description::Properties;
+use crate::error::Result;
+use crate::interaction::{Hit, Interaction, Ray};
+use crate::math::{Frame, offset, warp};
+
+/// A sphere in world space.
+#[derive(Debug)]
+pub struct Sphere {
+    center: Vec3,
+    radius: f32,
+    /// From local to world directions; orthonormal, mirrored where `to_world` mirrors.
+    rotation: Mat3,
+    /// Normals point inward.
+    flip_normals: bool,
+}
+
+pub(super) fn build(properties: &Properties<'_>) -> Result<Geometry> {
+    let to_world = to_world(properties)?;
+    let center = properties.vector("center")?.unwrap_or(DVec3::ZERO);
+    let radius = properties.float("radius")?.unwrap_or(1.0);
+    let axes = [to_world.x_axis, to_world.y_axis, to_world.z_axis].map(|a| a.truncate());
+    let scale = axes[0].length();
+    let uneven = axes.iter().any(|a| (a.length() / scale - 1.0).abs() > 1e-4)
+        || (0..3).any(|i| axes[i].dot(axes[(i + 1) % 3]).abs() > 1e-4 * scale * scale);
+    if uneven {
+        return Err(properties
+            .error("to_world", "a sphere cannot be stretched or sheared")
+            .help("scale all axes alike"));
+    }
+    let (center, radius) = (to_world.transform_point3(center).as_vec3(), (radius * scale) as f32);
+    if !(radius > 0.0 && radius.is_finite() && center.is_finite()) {
+        return Err(properties.error("radius", "a sphere needs a positive, finite radius"));
+    }
+    let [x, y, z] = axes.map(|a| (a / scale).as_vec3());
+    let flip_normals = properties.boolean("flip_normals")?.unwrap_or(false);
+    Ok(Geometry::Sphere(Sphere { center, radius, rotation: Mat3::from_cols(x, y, z), flip_normals }))
+}
+
+impl Sphere {
+    /// 1 − cos of the half angle under which a point sees the sphere; `None` from inside.
+    fn cone(&self, from: Vec3) -> Option<f32> {
+        let squared = (self.center - from).as_dvec3().length_squared();
+        let sin2 = f64::from(self.radius).powi(2) / squared;
+        // From this close the sphere is sampled by area: the cone's map has no precision left.
+        (sin2 < 0.9999).then(|| (sin2 / (1.0 + (1.0 - sin2).sqrt())) as f32)
+    }
+
+    fn outward(&self, position: Vec3) -> Vec3 {
+        ((position - self.center) / self.radius).normalize()
+    }
+
+    fn side(&self) -> f32 {
+        if self.flip_normals { -1.0 } else { 1.0 }
+    }
+
+    fn uv(&self, outward: Vec3) -> Vec2 {
+        let local = self.rotation.transpose() * outward;
+        let phi = local.y.atan2(local.x);
+        let phi = if phi < 0.0 { phi + TAU } else { phi };
+        Vec2::new(phi / TAU, local.z.clamp(-1.0, 1.0).acos() * FRAC_1_PI)
+    }
+}
+
+impl Surface for Sphere {
+    fn primitive_count(&self) -> u32 {
+        1
+    }
+
+    fn bounds(&self, _primitive: u32) -> Bounds {
+        let reach = Vec3::splat(self.radius) + (self.center.abs() + self.radius) * offset::gamma(5);
+        Bounds { min: self.center - reach, max: self.center + reach }
+    }
+
+    fn intersect(&self, _primitive: u32, ray: &Ray) -> Option<(f32, f32, f32)> {
+        let (o, d) = ((ray.origin.as_dvec3() - self.center.as_dvec3()), ray.direction.as_dvec3());
+        let (a, b) = (d.length_squared(), o.dot(d));
+        let r2 = f64::from(self.radius).powi(2);
+        // The distance of the line from the centre, without the cancellation of b² − ac.
+        let nearest = o - d * (b / a);
+        let discriminant = a * (r2 - nearest.length_squared());
+        if discriminant < 0.0 {
+            return None;
+        }
+        let root = discriminant.sqrt();
+        let q = if b < 0.0 { root - b } else { -root - b };
+        let c = o.length_squared() - r2;
+        let (t0, t1) = (q / a, if q == 0.0 { q / a } else { c / q });
+        let (near, far) = (t0.min(t1), t0.max(t1));
+        [near, far].into_iter().map(|t| t as f32).find(|&t| t > 0.0 && t <= ray.t_max).map(|t| (t, 0.0, 0.0))
+    }
+
+    fn interaction(&self, ray: &Ray, hit: &Hit) -> Interaction<'_> {
+        let outward = self.outward(ray.at(hit.t));
+        let position = self.center + self.radius * outward;
+        let error = offset::gamma(5) * (self.center.abs() + self.radius * outward.abs());
+        let normal = self.side() * outward;
+        let local = self.rotation.transpose() * outward;
+        let rim = (local.x * local.x + local.y * local.y).sqrt();
+        let (dp_du, dp_dv) = if rim > 0.0 {
+            let (cos, sin) = (local.x / rim, local.y / rim);
+            (Vec3::new(-local.y, local.x, 0.0) * TAU, Vec3::new(local.z * cos, local.z * sin, -rim) * PI)
+        } else {
+            (Vec3::ZERO, Vec3::new(local.z, 0.0, 0.0) * PI)
+        };
+        let scaled = self.rotation * self.radius;
+        let (dp_du, dp_dv) = (scaled * dp_du, scaled * dp_dv);
+        let frame = Frame::along(normal, dp_du);
+        Interaction {
+            t: hit.t,
+            position,
+            error,
+            normal,
+            frame,
+            uv: self.uv(outward),
+            dp_du,
+            dp_dv,
+            wi: frame.to_local(-ray.direction),
+            time: ray.time,
+            shape: hit.shape,
+            primitive: 0,
+            mesh: None,
+            barycentric: Vec2::ZERO,
+        }
+    }
+
+    fn area(&self) -> f64 {
+        4.0 * std::f64::consts::PI * f64::from(self.radius).powi(2)
+    }
+
+    fn sample(&self, from: Vec3, u: Vec2) -> Option<SurfaceSample> {
+        let Some(one_minus_cos) = self.cone(from) else {
+            let outward = warp::uniform_sphere(u);
+            let position = self.center + self.radius * outward;
+            let pdf = area_to_solid_angle(self.area(), from, position, outward);
+            let sample =
+                SurfaceSample { position, normal: self.side() * outward, uv: self.uv(outward), pdf };
+            return (pdf > 0.0).then_some(sample);
+        };
+        // The direction of the cone's sample, and from it the normal where that direction meets the
+        // sphere (Mitsuba's and PBRT's geometry: the angle α at the centre).
+        let way = self.center - from;
+        let distance = way.length();
+        let cone = warp::uniform_cone(u, one_minus_cos);
+        let (sin2, cos) = (1.0 - cone.z * cone.z, cone.z);
+        let to_hit = distance * cos - (self.radius.powi(2) - distance.powi(2) * sin2).max(0.0).sqrt();
+        let cos_alpha = (distance.powi(2) + self.radius.powi(2) - to_hit.powi(2)) / (2.0 * distance * self.radius);
+        let sin_alpha = (1.0 - cos_alpha * cos_alpha).max(0.0).sqrt();
+        let around = Vec2::new(cone.x, cone.y).normalize_or_zero() * sin_alpha;
+        let frame = Frame::around(way / distance);
+        let outward = frame.to_world(Vec3::new(around.x, around.y, -cos_alpha)).normalize();
+        let pdf = warp::uniform_cone_pdf(one_minus_cos);
+        let position = self.center + self.radius * outward;
+        Some(SurfaceSample { position, normal: self.side() * outward, uv: self.uv(outward), pdf })
+    }
+
+    fn pdf(&self, from: Vec3, at: &Interaction<'_>) -> f32 {
+        match self.cone(from) {
+            Some(one_minus_cos) => warp::uniform_cone_pdf(one_minus_cos),
+            None => area_to_solid_angle(self.area(), from, at.position, at.normal),
+        }
+    }
+
+    fn bytes(&self) -> usize {
+        size_of::<Self>()
+    }
+}

@@ -1,0 +1,134 @@
+//! `bitmap`: an image file over texture coordinates, (0, 0) at the upper left corner of the image and v
+//! downwards. `filter_type` is bilinear or nearest, `wrap_mode` repeat, mirror or clamp; 8- and 16-bit
+//! files are decoded from sRGB unless `raw` says that they hold numbers; alpha is dropped.
+
+use std::sync::Arc;
+
+use glam::{Mat3, Vec2};
+
+use super::{Palette, Pattern, to_uv, transformed};
+use crate::color::{ColorModel, Role, Spectral, srgb};
+use crate::description::Properties;
+use crate::error::Result;
+use crate::image::{self, Encoding, Limits};
+use crate::interaction::Interaction;
+
+/// An image whose texels are ready to be evaluated, row by row from the top.
+#[derive(Debug)]
+pub(super) struct Texels<C: ColorModel> {
+    width: usize,
+    height: usize,
+    texels: Vec<C::Texel>,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Wrap {
+    Repeat,
+    Mirror,
+    Clamp,
+}
+
+impl Wrap {
+    /// The texel that stands for index `i` of `n`, wherever `i` lies.
+    fn apply(self, i: i64, n: usize) -> usize {
+        let n = n as i64;
+        let wrapped = match self {
+            Self::Repeat => i.rem_euclid(n),
+            Self::Clamp => i.clamp(0, n - 1),
+            Self::Mirror => {
+                let i = i.rem_euclid(2 * n);
+                i.min(2 * n - 1 - i)
+            }
+        };
+        wrapped as usize
+    }
+}
+
+/// A texture from an image.
+#[derive(Clone, Debug)]
+pub struct Bitmap<C: ColorModel> {
+    texels: Arc<Texels<C>>,
+    nearest: bool,
+    wrap: Wrap,
+    to_uv: Mat3,
+}
+
+impl<C: ColorModel> Bitmap<C> {
+    pub(super) fn build(properties: &Properties<'_>, palette: &Palette<C>) -> Result<Self> {
+        let nearest = match properties.string("filter_type")?.unwrap_or("bilinear") {
+            "bilinear" => false,
+            "nearest" => true,
+            other => {
+                let error = properties.error("filter_type", format!("unknown filter type \"{other}\""));
+                return Err(error.help("there are bilinear and nearest"));
+            }
+        };
+        let wrap = match properties.string("wrap_mode")?.unwrap_or("repeat") {
+            "repeat" => Wrap::Repeat,
+            "mirror" => Wrap::Mirror,
+            "clamp" => Wrap::Clamp,
+            other => {
+                let error = properties.error("wrap_mode", format!("unknown wrap mode \"{other}\""));
+                return Err(error.help("there are repeat, mirror and clamp"));
+            }
+        };
+        let raw = properties.boolean("raw")?.unwrap_or(false);
+        let Some(path) = properties.file("filename")? else {
+            return Err(properties.error("filename", "a bitmap needs a filename"));
+        };
+        let to_uv = to_uv(properties)?;
+        let key = (path, palette.role, raw);
+        let lock = || palette.texels.lock().expect("no thread panics while it holds the cache");
+        let cached = lock().get(&key).cloned();
+        let texels = match cached {
+            Some(texels) => texels,
+            None => {
+                let loaded = load(&key.0, palette, raw).map_err(|e| e.at(properties.location()))?;
+                lock().entry(key).or_insert(Arc::new(loaded)).clone()
+            }
+        };
+        Ok(Self { texels, nearest, wrap, to_uv })
+    }
+
+    fn texel(&self, x: i64, y: i64, wavelengths: &C::Wavelengths) -> C::Sample {
+        let Texels { width, height, texels } = &*self.texels;
+        let (x, y) = (self.wrap.apply(x, *width), self.wrap.apply(y, *height));
+        C::evaluate_texel(&texels[y * width + x], wavelengths)
+    }
+}
+
+fn load<C: ColorModel>(path: &std::path::Path, palette: &Palette<C>, raw: bool) -> Result<Texels<C>> {
+    let picture = image::read(path, &Limits::default())?;
+    let encoded = picture.encoding != Encoding::Linear && !raw;
+    let decode = |v: f32| if encoded { srgb::decode(v) } else { v };
+    let (width, height) = (picture.image.width(), picture.image.height());
+    let Some([r, g, b]) = picture.image.rgb() else {
+        let message = format!("{}: no colour channels among {:?}", path.display(), picture.image.channels());
+        return Err(crate::error::Error::input(message));
+    };
+    let role = if raw && palette.role == Role::Reflectance { Role::Quantity } else { palette.role };
+    let texel = |x, y| {
+        let rgb = [r, g, b].map(|c| decode(picture.image.get(x, y, c)));
+        palette.color.texel(rgb.map(|v| if v.is_finite() { v } else { 0.0 }), role)
+    };
+    let texels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| texel(x, y)).collect();
+    Ok(Texels { width: width as usize, height: height as usize, texels })
+}
+
+impl<C: ColorModel> Pattern<C> for Bitmap<C> {
+    fn eval(&self, at: &Interaction<'_>, wavelengths: &C::Wavelengths) -> C::Sample {
+        let size = Vec2::new(self.texels.width as f32, self.texels.height as f32);
+        let p = transformed(&self.to_uv, at.uv) * size;
+        if self.nearest {
+            return self.texel(p.x.floor() as i64, p.y.floor() as i64, wavelengths);
+        }
+        let p = p - 0.5;
+        let (corner, f) = (p.floor(), p - p.floor());
+        let (x, y) = (corner.x as i64, corner.y as i64);
+        let row = |y| {
+            self.texel(x, y, wavelengths) * (1.0 - f.x) + self.texel(x.saturating_add(1), y, wavelengths) * f.x
+        };
+        let value = row(y) * (1.0 - f.y) + row(y.saturating_add(1)) * f.y;
+        value.map(|v| if v.is_finite() { v } else { 0.0 })
+    }
+}
