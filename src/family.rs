@@ -10,13 +10,13 @@ macro_rules! family {
     (
         $(#[$meta:meta])*
         $vis:vis enum $family:ident $(<$color:ident>)? : $interface:ident, kind $kind:literal, context $context:ty {
-            $($name:literal => $member:ident in $module:ident),+ $(,)?
+            $($name:literal => $member:ident($type:ty)),+ $(,)?
         }
     ) => {
         $(#[$meta])*
         #[allow(missing_docs)] // each variant is documented at the plugin that it holds
         $vis enum $family $(<$color: crate::color::ColorModel>)? {
-            $($member($module::$member $(<$color>)?)),+
+            $($member($type)),+
         }
 
         impl $(<$color: crate::color::ColorModel>)? $family $(<$color>)? {
@@ -29,7 +29,7 @@ macro_rules! family {
                 context: &$context,
             ) -> crate::error::Result<Self> {
                 match properties.plugin() {
-                    $($name => Ok(Self::$member($module::$member::build(properties, context)?)),)+
+                    $($name => Ok(Self::$member(<$type>::build(properties, context)?)),)+
                     other => Err(crate::family::unknown(properties, $kind, other, Self::NAMES)),
                 }
             }

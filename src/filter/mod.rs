@@ -24,12 +24,12 @@ family! {
     /// Every reconstruction filter there is.
     #[derive(Clone, Debug)]
     pub enum Filter: Kernel, kind "rfilter", context () {
-        "box" => Box in r#box,
-        "catmullrom" => CatmullRom in catmullrom,
-        "gaussian" => Gaussian in gaussian,
-        "lanczos" => Lanczos in lanczos,
-        "mitchell" => Mitchell in mitchell,
-        "tent" => Tent in tent,
+        "box" => Box(r#box::Box),
+        "catmullrom" => CatmullRom(catmullrom::CatmullRom),
+        "gaussian" => Gaussian(gaussian::Gaussian),
+        "lanczos" => Lanczos(lanczos::Lanczos),
+        "mitchell" => Mitchell(mitchell::Mitchell),
+        "tent" => Tent(tent::Tent),
     }
 }
 

@@ -31,8 +31,8 @@ family! {
     /// Every sampler there is.
     #[derive(Clone, Debug)]
     pub enum Sampler: PointSet, kind "sampler", context () {
-        "independent" => Independent in independent,
-        "stratified" => Stratified in stratified,
+        "independent" => Independent(independent::Independent),
+        "stratified" => Stratified(stratified::Stratified),
     }
 }
 

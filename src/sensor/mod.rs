@@ -31,8 +31,8 @@ family! {
     /// Every sensor there is.
     #[derive(Clone, Debug)]
     pub enum Sensor: Camera, kind "sensor", context Film {
-        "orthographic" => Orthographic in orthographic,
-        "perspective" => Perspective in perspective,
+        "orthographic" => Orthographic(orthographic::Orthographic),
+        "perspective" => Perspective(perspective::Perspective),
     }
 }
 

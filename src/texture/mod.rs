@@ -29,9 +29,9 @@ family! {
     /// Every texture there is.
     #[derive(Clone, Debug)]
     pub enum Texture<C>: Pattern, kind "texture", context Palette<C> {
-        "bitmap" => Bitmap in bitmap,
-        "checkerboard" => Checkerboard in checkerboard,
-        "uniform" => Uniform in uniform,
+        "bitmap" => Bitmap(bitmap::Bitmap<C>),
+        "checkerboard" => Checkerboard(checkerboard::Checkerboard<C>),
+        "uniform" => Uniform(uniform::Uniform<C>),
     }
 }
 
@@ -59,26 +59,44 @@ impl<C: ColorModel> Palette<C> {
         Self { color: self.color.clone(), role, texels: self.texels.clone() }
     }
 
-    /// The colour or texture called `name`, or `default` everywhere.
-    pub fn texture(&self, properties: &Properties<'_>, name: &'static str, role: Role, default: Color) -> Result<Texture<C>> {
-        let palette = self.with_role(role);
+    /// The colour called `name`, or `default`; textures are refused.
+    pub fn color(
+        &self,
+        properties: &Properties<'_>,
+        name: &'static str,
+        role: Role,
+        default: Color,
+    ) -> Result<C::Stored> {
+        let store = |color: &Color| self.color.store(color, role);
         match properties.value(name) {
-            None => palette.uniform(&default).map_err(|e| properties.error(name, e)),
+            None => store(&default).map_err(|e| properties.error(name, e)),
             Some(Property { value: Value::Object(_), .. }) => {
                 let child = properties.object(name)?.expect("the property is an object");
-                match child.kind() {
-                    Kind::Texture => Texture::build(&child, &palette),
-                    _ => palette.uniform(&spectrum(&child)?).map_err(|e| child.error("value", e)),
-                }
+                store(&spectrum(&child)?).map_err(|e| child.error("value", e))
             }
-            Some(property) => {
-                let color = color(property)?;
-                palette.uniform(&color).map_err(|e| Error::input(e).at(&property.location))
-            }
+            Some(property) => store(&color(property)?).map_err(|e| properties.error(name, e)),
         }
     }
 
-    fn uniform(&self, color: &Color) -> std::result::Result<Texture<C>, String> {
+    /// The colour or texture called `name`, or `default` everywhere.
+    pub fn texture(
+        &self,
+        properties: &Properties<'_>,
+        name: &'static str,
+        role: Role,
+        default: Color,
+    ) -> Result<Texture<C>> {
+        if let Some(Property { value: Value::Object(_), .. }) = properties.value(name) {
+            let child = properties.object(name)?.expect("the property is an object");
+            if child.kind() == Kind::Texture {
+                return Texture::build(&child, &self.with_role(role));
+            }
+        }
+        Ok(Texture::Uniform(uniform::Uniform::new(self.color(properties, name, role, default)?)))
+    }
+
+    /// The same value, which must be valid for the palette's role, everywhere.
+    pub fn uniform(&self, color: &Color) -> std::result::Result<Texture<C>, String> {
         Ok(Texture::Uniform(uniform::Uniform::new(self.color.store(color, self.role)?)))
     }
 }

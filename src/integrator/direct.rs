@@ -1,0 +1,148 @@
+//! `direct`: emission and light that arrives directly, by `emitter_samples` of the lights and
+//! `bsdf_samples` of the material (`shading_samples`, 1, for both), combined by multiple importance
+//! sampling. Equal to `path` at `max_depth` 2 in the mean.
+
+use super::mis::power;
+use super::{Estimate, Estimator, FIRST_DIMENSION, Start, Stats};
+use crate::color::{ColorModel, Spectral};
+use crate::description::Properties;
+use crate::error::Result;
+use crate::interaction::Ray;
+use crate::sampler::Sampler;
+use crate::scene::Scene;
+use glam::Vec3;
+
+/// The settings.
+#[derive(Clone, Copy, Debug)]
+pub struct Direct {
+    emitter_samples: u32,
+    bsdf_samples: u32,
+    hide_emitters: bool,
+}
+
+/// A sample of the light or of the material, still to be traced.
+#[derive(Clone, Copy, Debug)]
+struct Probe<S> {
+    ray: Ray,
+    /// What light found there is multiplied by; of a light sample, the light itself is in it.
+    factor: S,
+    slot: u32,
+    /// Where it starts and the density of a material's sample, unless that is a delta.
+    scattered: Option<(Vec3, f32)>,
+}
+
+/// The most samples of a kind.
+const MAX_SAMPLES: i64 = 1 << 12;
+
+impl Direct {
+    pub(super) fn build(properties: &Properties<'_>, _context: &()) -> Result<Self> {
+        let count = |name: &'static str, default: u32| {
+            let n = properties.integer(name)?.unwrap_or(i64::from(default));
+            if !(0..=MAX_SAMPLES).contains(&n) {
+                return Err(properties.error(name, format!("{n} samples; 0 to {MAX_SAMPLES} are possible")));
+            }
+            Ok(n as u32)
+        };
+        let shading = count("shading_samples", 1)?;
+        if properties.has("shading_samples") {
+            for name in ["emitter_samples", "bsdf_samples"] {
+                if properties.has(name) {
+                    return Err(properties.error(name, format!("{name} and shading_samples exclude each other")));
+                }
+            }
+        }
+        let (emitter_samples, bsdf_samples) = (count("emitter_samples", shading)?, count("bsdf_samples", shading)?);
+        if emitter_samples + bsdf_samples == 0 {
+            return Err(properties.error("bsdf_samples", "direct needs at least one sample of either kind"));
+        }
+        let hide_emitters = properties.boolean("hide_emitters")?.unwrap_or(false);
+        Ok(Self { emitter_samples, bsdf_samples, hide_emitters })
+    }
+
+    /// The share of samples of a kind in both.
+    fn share(&self, samples: u32) -> f32 {
+        samples as f32 / (self.emitter_samples + self.bsdf_samples) as f32
+    }
+}
+
+impl<C: ColorModel> Estimator<C> for Direct {
+    fn estimate(
+        &self,
+        scene: &Scene<C>,
+        sampler: &Sampler,
+        starts: &[Start<C>],
+        estimates: &mut Vec<Estimate<C::Sample>>,
+        stats: &mut Stats,
+    ) {
+        estimates.clear();
+        let (light_share, bsdf_share) = (self.share(self.emitter_samples), self.share(self.bsdf_samples));
+        let (mut rays, mut hits): (Vec<Ray>, _) = (starts.iter().map(|s| s.ray).collect(), Vec::new());
+        stats.camera_rays += rays.len() as u64;
+        scene.closest(&rays, &mut hits, &mut stats.tracing);
+
+        let (mut shadows, mut probes): (Vec<Probe<C::Sample>>, Vec<Probe<C::Sample>>) = (Vec::new(), Vec::new());
+        for (slot, (start, hit)) in starts.iter().zip(&hits).enumerate() {
+            let (w, slot) = (&start.wavelengths, slot as u32);
+            let at = (!hit.is_miss()).then(|| scene.interaction(&start.ray, hit));
+            let emission = match &at {
+                Some(at) => scene.emitted(at, start.ray.origin, w),
+                None => scene.surrounding(start.ray.direction, w),
+            };
+            let radiance = emission.filter(|_| !self.hide_emitters).map_or(C::Sample::zero(), |e| e.0);
+            let surrounded = scene.has_environment() && !self.hide_emitters;
+            let alpha = if at.is_some() || surrounded { 1.0 } else { 0.0 };
+            estimates.push(Estimate { radiance: radiance * scene.color().unit(), alpha });
+            let Some(at) = at else { continue };
+            stats.shaded += 1;
+            let material = scene.material(&at);
+            let mut stream = start.stream;
+            stream.seek(FIRST_DIMENSION);
+            for _ in 0..self.emitter_samples {
+                let (u1, u2) = (stream.next_1d(sampler), stream.next_2d(sampler));
+                let Some(light) = scene.sample_light(at.position, u1, u2, w) else { continue };
+                let Some(value) = material.eval(&at, at.wi, at.frame.to_local(light.direction), w) else {
+                    continue;
+                };
+                let other = if light.delta { 0.0 } else { value.pdf * bsdf_share };
+                let weight = power(light.pdf * light_share, other) / (light.pdf * self.emitter_samples as f32);
+                let factor = scene.color().unit() * value.value * light.radiance * weight;
+                if !factor.is_black() {
+                    let ray = light.target.map_or_else(|| at.spawn(light.direction), |target| at.spawn_to(target));
+                    shadows.push(Probe { ray, factor, slot, scattered: None });
+                }
+            }
+            for _ in 0..self.bsdf_samples {
+                let (u1, u2) = (stream.next_1d(sampler), stream.next_2d(sampler));
+                let Some(sample) = material.sample(&at, at.wi, u1, u2, w) else { continue };
+                let factor = scene.color().unit() * sample.weight / self.bsdf_samples as f32;
+                let ray = at.spawn(at.frame.to_world(sample.wo));
+                let scattered = (!sample.delta).then_some((at.position, sample.pdf));
+                probes.push(Probe { ray, factor, slot, scattered });
+            }
+        }
+
+        let mut blocked = Vec::new();
+        stats.shadow_rays += shadows.len() as u64;
+        scene.occluded(shadows.iter().map(|s| s.ray), &mut blocked, &mut stats.tracing);
+        for (shadow, _) in shadows.iter().zip(&blocked).filter(|(_, blocked)| !**blocked) {
+            estimates[shadow.slot as usize].radiance += shadow.factor;
+        }
+
+        rays.clear();
+        rays.extend(probes.iter().map(|p| p.ray));
+        stats.bounce_rays += rays.len() as u64;
+        scene.closest(&rays, &mut hits, &mut stats.tracing);
+        for (probe, hit) in probes.iter().zip(&hits) {
+            let w = &starts[probe.slot as usize].wavelengths;
+            let from = probe.scattered.map_or(probe.ray.origin, |(from, _)| from);
+            let emission = if hit.is_miss() {
+                scene.surrounding(probe.ray.direction, w)
+            } else {
+                scene.emitted(&scene.interaction(&probe.ray, hit), from, w)
+            };
+            let Some((radiance, light_pdf)) = emission else { continue };
+            let weight = probe.scattered.map_or(1.0, |(_, pdf)| power(pdf * bsdf_share, light_pdf * light_share));
+            estimates[probe.slot as usize].radiance += probe.factor * radiance * weight;
+        }
+    }
+}

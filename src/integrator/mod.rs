@@ -1,0 +1,101 @@
+//! Integrators: from camera samples to radiance, a batch at a time.
+//!
+//! A batch goes bounce by bounce: all its rays are traced, then all its hits shaded, then all its shadow
+//! rays traced. Contributions reach a path's slot in a fixed order (emission, then light samples, bounce
+//! by bounce), so that the sum's bits do not depend on the batch.
+
+mod direct;
+mod mis;
+mod moment;
+mod path;
+
+use crate::accel::Counts;
+use crate::color::ColorModel;
+use crate::family::family;
+use crate::interaction::Ray;
+use crate::sampler::{Sampler, Stream};
+use crate::scene::Scene;
+
+/// A camera sample.
+#[derive(Clone, Copy, Debug)]
+pub struct Start<C: ColorModel> {
+    /// The camera's ray.
+    pub ray: Ray,
+    /// The path's wavelengths.
+    pub wavelengths: C::Wavelengths,
+    /// The path's random numbers.
+    pub stream: Stream,
+}
+
+/// What a camera sample came to.
+#[derive(Clone, Copy, Debug)]
+pub struct Estimate<S> {
+    /// Radiance toward the camera.
+    pub radiance: S,
+    /// Whether the sample met anything, as opacity.
+    pub alpha: f32,
+}
+
+/// What light transport costs, counted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Stats {
+    /// Rays from the camera.
+    pub camera_rays: u64,
+    /// Rays that continue a path.
+    pub bounce_rays: u64,
+    /// Rays that ask whether a light is visible.
+    pub shadow_rays: u64,
+    /// Points whose material was asked.
+    pub shaded: u64,
+    /// Steps and tests of all of them.
+    pub tracing: Counts,
+}
+
+impl Stats {
+    /// Rays of all kinds.
+    pub fn rays(&self) -> u64 {
+        self.camera_rays + self.bounce_rays + self.shadow_rays
+    }
+
+    /// Adds another part's counts.
+    pub fn add(&mut self, other: &Self) {
+        self.camera_rays += other.camera_rays;
+        self.bounce_rays += other.bounce_rays;
+        self.shadow_rays += other.shadow_rays;
+        self.shaded += other.shaded;
+        self.tracing.add(&other.tracing);
+    }
+}
+
+/// What every integrator does.
+pub trait Estimator<C: ColorModel>: std::fmt::Debug + Send + Sync {
+    /// Estimates the radiance of each start, in the order of the starts.
+    fn estimate(
+        &self,
+        scene: &Scene<C>,
+        sampler: &Sampler,
+        starts: &[Start<C>],
+        estimates: &mut Vec<Estimate<C::Sample>>,
+        stats: &mut Stats,
+    );
+}
+
+family! {
+    /// Every integrator there is.
+    #[derive(Debug)]
+    pub enum Integrator<C>: Estimator, kind "integrator", context () {
+        "direct" => Direct(direct::Direct),
+        "moment" => Moment(moment::Moment<C>),
+        "path" => Path(path::Path),
+    }
+}
+
+impl<C: ColorModel> Default for Integrator<C> {
+    /// Mitsuba's: `path` without a limit.
+    fn default() -> Self {
+        Self::Path(path::Path::default())
+    }
+}
+
+/// The first dimension that an integrator may use; those before are the camera's.
+pub const FIRST_DIMENSION: u32 = 6;

@@ -1,0 +1,38 @@
+//! `moment`: renders its nested integrator. (Mitsuba's also writes the samples' squares; its scenes use
+//! it for their references, and the image is the nested one's.)
+
+use super::{Estimate, Estimator, Integrator, Start, Stats};
+use crate::color::ColorModel;
+use crate::description::{Kind, Properties};
+use crate::error::Result;
+use crate::sampler::Sampler;
+use crate::scene::Scene;
+
+/// Around one integrator.
+#[derive(Debug)]
+pub struct Moment<C: ColorModel> {
+    nested: Box<Integrator<C>>,
+}
+
+impl<C: ColorModel> Moment<C> {
+    pub(super) fn build(properties: &Properties<'_>, context: &()) -> Result<Self> {
+        match &properties.children(Kind::Integrator)[..] {
+            [child] => Ok(Self { nested: Box::new(Integrator::build(child, context)?) }),
+            children => Err(properties
+                .error("", format!("moment needs one nested integrator, and has {}", children.len()))),
+        }
+    }
+}
+
+impl<C: ColorModel> Estimator<C> for Moment<C> {
+    fn estimate(
+        &self,
+        scene: &Scene<C>,
+        sampler: &Sampler,
+        starts: &[Start<C>],
+        estimates: &mut Vec<Estimate<C::Sample>>,
+        stats: &mut Stats,
+    ) {
+        self.nested.estimate(scene, sampler, starts, estimates, stats);
+    }
+}

@@ -1,0 +1,221 @@
+//! `path`: unidirectional path tracing (Kajiya, *The rendering equation*, 1986) with one light sample a
+//! bounce, multiple importance sampling and Russian roulette.
+//!
+//! `max_depth` counts edges: 1 is emission seen directly, 2 direct light, −1 (default) no limit.
+//! Roulette starts at `rr_depth` (5) and lets a path live with probability min(max(throughput)·η², 0.95).
+
+use super::mis::power;
+use super::{Estimate, Estimator, FIRST_DIMENSION, Start, Stats};
+use crate::color::{ColorModel, Spectral};
+use crate::description::Properties;
+use crate::error::Result;
+use crate::interaction::{Hit, Interaction, Ray};
+use crate::light::LightSample;
+use crate::sampler::{Sampler, Stream};
+use crate::scene::Scene;
+use glam::Vec3;
+
+/// The path tracer's settings.
+#[derive(Clone, Copy, Debug)]
+pub struct Path {
+    max_depth: u32,
+    rr_depth: u32,
+    hide_emitters: bool,
+}
+
+impl Default for Path {
+    fn default() -> Self {
+        Self { max_depth: u32::MAX, rr_depth: 5, hide_emitters: false }
+    }
+}
+
+/// Dimensions of a bounce: light choice, light, lobe, direction, roulette; one to spare.
+const DIMENSIONS: u32 = 8;
+/// The longest life that roulette grants.
+const MAX_SURVIVAL: f32 = 0.95;
+
+/// A path on its way.
+#[derive(Clone, Copy, Debug)]
+struct Walker<C: ColorModel> {
+    ray: Ray,
+    throughput: C::Sample,
+    wavelengths: C::Wavelengths,
+    stream: Stream,
+    /// Index of the start, and of the estimate.
+    slot: u32,
+    /// Product of the indices of refraction passed.
+    eta: f32,
+    /// Where the ray was scattered and with what density, unless at the camera or into a delta lobe.
+    scattered: Option<(Vec3, f32)>,
+}
+
+/// A light sample whose visibility is still to be asked.
+#[derive(Clone, Copy, Debug)]
+struct Shadow<S> {
+    ray: Ray,
+    contribution: S,
+    slot: u32,
+}
+
+impl Path {
+    pub(super) fn build(properties: &Properties<'_>, _context: &()) -> Result<Self> {
+        let depth = |name: &'static str, default: i64, least: i64| {
+            let depth = properties.integer(name)?.unwrap_or(default);
+            if depth < least {
+                return Err(properties.error(name, format!("{name} must be at least {least}, and {depth} is not")));
+            }
+            Ok(u32::try_from(depth).unwrap_or(u32::MAX))
+        };
+        Ok(Self {
+            max_depth: depth("max_depth", -1, -1)?,
+            rr_depth: depth("rr_depth", 5, 1)?,
+            hide_emitters: properties.boolean("hide_emitters")?.unwrap_or(false),
+        })
+    }
+
+    /// What the ray meets at its end: its emission goes to the estimate; the point is where the path
+    /// goes on, if it does.
+    fn arrive<'s, C: ColorModel>(
+        &self,
+        scene: &'s Scene<C>,
+        depth: u32,
+        walker: &Walker<C>,
+        hit: &Hit,
+        estimate: &mut Estimate<C::Sample>,
+    ) -> Option<Interaction<'s>> {
+        let hidden = depth == 0 && self.hide_emitters;
+        let from = walker.scattered.map_or(walker.ray.origin, |(from, _)| from);
+        let at = (!hit.is_miss()).then(|| scene.interaction(&walker.ray, hit));
+        let emission = match &at {
+            Some(at) => scene.emitted(at, from, &walker.wavelengths),
+            None => scene.surrounding(walker.ray.direction, &walker.wavelengths),
+        };
+        if let Some((radiance, light_pdf)) = emission.filter(|_| !hidden) {
+            let weight = walker.scattered.map_or(1.0, |(_, pdf)| power(pdf, light_pdf));
+            estimate.radiance += walker.throughput * radiance * weight;
+        }
+        if depth == 0 {
+            let surrounded = scene.has_environment() && !self.hide_emitters;
+            estimate.alpha = if at.is_some() || surrounded { 1.0 } else { 0.0 };
+        }
+        at
+    }
+
+    /// Light drawn toward `at`, if any may arrive.
+    fn light<C: ColorModel>(
+        scene: &Scene<C>,
+        sampler: &Sampler,
+        walker: &mut Walker<C>,
+        at: &Interaction<'_>,
+    ) -> Option<Shadow<C::Sample>> {
+        let (u1, u2) = (walker.stream.next_1d(sampler), walker.stream.next_2d(sampler));
+        let material = scene.material(at);
+        if !material.is_smooth() {
+            return None;
+        }
+        let LightSample { direction, target, radiance, pdf, delta } =
+            scene.sample_light(at.position, u1, u2, &walker.wavelengths)?;
+        let value = material.eval(at, at.wi, at.frame.to_local(direction), &walker.wavelengths)?;
+        let weight = if delta { 1.0 } else { power(pdf, value.pdf) };
+        let contribution = walker.throughput * value.value * radiance * (weight / pdf);
+        if contribution.is_black() {
+            return None;
+        }
+        let ray = match target {
+            Some(target) => at.spawn_to(target),
+            None => at.spawn(direction),
+        };
+        Some(Shadow { ray, contribution, slot: walker.slot })
+    }
+
+    /// Turns the path at `at`; `None` where it ends there.
+    fn scatter<C: ColorModel>(
+        &self,
+        scene: &Scene<C>,
+        sampler: &Sampler,
+        depth: u32,
+        mut walker: Walker<C>,
+        at: &Interaction<'_>,
+    ) -> Option<Walker<C>> {
+        let (u1, u2) = (walker.stream.next_1d(sampler), walker.stream.next_2d(sampler));
+        let sample = scene.material(at).sample(at, at.wi, u1, u2, &walker.wavelengths)?;
+        walker.throughput *= sample.weight;
+        walker.eta *= sample.eta;
+        walker.ray = at.spawn(at.frame.to_world(sample.wo));
+        walker.scattered = (!sample.delta).then_some((at.position, sample.pdf));
+        if walker.throughput.is_black() {
+            return None;
+        }
+        if depth + 1 >= self.rr_depth {
+            let survival = (walker.throughput.max_value() * walker.eta * walker.eta).min(MAX_SURVIVAL);
+            if walker.stream.next_1d(sampler) >= survival {
+                return None;
+            }
+            walker.throughput = walker.throughput / survival;
+        }
+        Some(walker)
+    }
+}
+
+impl<C: ColorModel> Estimator<C> for Path {
+    fn estimate(
+        &self,
+        scene: &Scene<C>,
+        sampler: &Sampler,
+        starts: &[Start<C>],
+        estimates: &mut Vec<Estimate<C::Sample>>,
+        stats: &mut Stats,
+    ) {
+        estimates.clear();
+        estimates.resize(starts.len(), Estimate { radiance: C::Sample::zero(), alpha: 0.0 });
+        if self.max_depth == 0 {
+            return;
+        }
+        let mut walkers: Vec<Walker<C>> = starts
+            .iter()
+            .enumerate()
+            .map(|(slot, start)| Walker {
+                ray: start.ray,
+                throughput: scene.color().unit(),
+                wavelengths: start.wavelengths,
+                stream: start.stream,
+                slot: slot as u32,
+                eta: 1.0,
+                scattered: None,
+            })
+            .collect();
+        let (mut rays, mut hits) = (Vec::new(), Vec::new());
+        let (mut shadows, mut blocked): (Vec<Shadow<C::Sample>>, _) = (Vec::new(), Vec::new());
+        for depth in 0.. {
+            if walkers.is_empty() {
+                break;
+            }
+            rays.clear();
+            rays.extend(walkers.iter().map(|w| w.ray));
+            *if depth == 0 { &mut stats.camera_rays } else { &mut stats.bounce_rays } += rays.len() as u64;
+            scene.closest(&rays, &mut hits, &mut stats.tracing);
+
+            let mut hits = hits.iter();
+            walkers = walkers
+                .into_iter()
+                .filter_map(|mut walker| {
+                    let hit = hits.next().expect("every ray has its hit");
+                    let at = self.arrive(scene, depth, &walker, hit, &mut estimates[walker.slot as usize])?;
+                    if depth + 1 >= self.max_depth {
+                        return None;
+                    }
+                    stats.shaded += 1;
+                    walker.stream.seek(FIRST_DIMENSION + depth * DIMENSIONS);
+                    shadows.extend(Self::light(scene, sampler, &mut walker, &at));
+                    self.scatter(scene, sampler, depth, walker, &at)
+                })
+                .collect();
+
+            stats.shadow_rays += shadows.len() as u64;
+            scene.occluded(shadows.iter().map(|s| s.ray), &mut blocked, &mut stats.tracing);
+            for (shadow, _) in shadows.drain(..).zip(&blocked).filter(|(_, blocked)| !**blocked) {
+                estimates[shadow.slot as usize].radiance += shadow.contribution;
+            }
+        }
+    }
+}

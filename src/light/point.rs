@@ -1,0 +1,43 @@
+//! `point`: light from the point `position` (or the origin of `to_world`), `intensity` in each direction.
+
+use glam::{Vec2, Vec3};
+
+use super::{Emitter, LightContext, LightSample, to_world};
+use crate::color::{Color, ColorModel, Role};
+use crate::description::Properties;
+use crate::error::Result;
+
+/// A point that gives light.
+#[derive(Clone, Debug)]
+pub struct Point<C: ColorModel> {
+    intensity: C::Stored,
+    position: Vec3,
+}
+
+impl<C: ColorModel> Point<C> {
+    pub(super) fn build(properties: &Properties<'_>, context: &LightContext<'_, C>) -> Result<Self> {
+        let position = match properties.vector("position")? {
+            Some(_) if properties.has("to_world") => {
+                return Err(properties.error("position", "position and to_world exclude each other"));
+            }
+            Some(position) => position.as_vec3(),
+            None => to_world(properties)?.translation(),
+        };
+        let intensity = context.palettes.colors.color(properties, "intensity", Role::Emission, Color::D65(1.0))?;
+        Ok(Self { intensity, position })
+    }
+}
+
+impl<C: ColorModel> Emitter<C> for Point<C> {
+    fn sample(&self, from: Vec3, _u: Vec2, wavelengths: &C::Wavelengths) -> Option<LightSample<C::Sample>> {
+        let way = self.position - from;
+        let squared = way.length_squared();
+        (squared > 0.0).then(|| LightSample {
+            direction: way / squared.sqrt(),
+            target: Some(self.position),
+            radiance: C::evaluate(&self.intensity, wavelengths) / squared,
+            pdf: 1.0,
+            delta: true,
+        })
+    }
+}

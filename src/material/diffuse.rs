@@ -1,0 +1,59 @@
+//! `diffuse`: Lambert's law, f = reflectance / π on the front side; `reflectance` 0.5 by default.
+
+use std::f32::consts::FRAC_1_PI;
+
+use glam::{Vec2, Vec3};
+
+use super::{Bsdf, BsdfSample, BsdfValue};
+use crate::color::{Color, ColorModel, Role, Spectral};
+use crate::description::Properties;
+use crate::error::Result;
+use crate::interaction::Interaction;
+use crate::math::warp;
+use crate::texture::{Palettes, Texture};
+
+/// An ideal matte surface.
+#[derive(Clone, Debug)]
+pub struct Diffuse<C: ColorModel> {
+    reflectance: Texture<C>,
+}
+
+impl<C: ColorModel> Diffuse<C> {
+    pub(super) fn build(properties: &Properties<'_>, palettes: &Palettes<C>) -> Result<Self> {
+        let default = Color::Grey(0.5);
+        Ok(Self { reflectance: palettes.colors.texture(properties, "reflectance", Role::Reflectance, default)? })
+    }
+
+    /// The same grey, in [0, 1], everywhere.
+    pub(super) fn grey(palettes: &Palettes<C>, value: f64) -> Self {
+        let palette = palettes.colors.with_role(Role::Reflectance);
+        Self { reflectance: palette.uniform(&Color::Grey(value)).expect("a fraction is a reflectance") }
+    }
+}
+
+impl<C: ColorModel> Bsdf<C> for Diffuse<C> {
+    fn is_smooth(&self) -> bool {
+        true
+    }
+
+    fn eval(&self, at: &Interaction<'_>, wi: Vec3, wo: Vec3, w: &C::Wavelengths) -> Option<BsdfValue<C::Sample>> {
+        (wi.z > 0.0 && wo.z > 0.0).then(|| BsdfValue {
+            value: self.reflectance.eval(at, w) * (FRAC_1_PI * wo.z),
+            pdf: warp::cosine_hemisphere_pdf(wo.z),
+        })
+    }
+
+    fn sample(
+        &self,
+        at: &Interaction<'_>,
+        wi: Vec3,
+        _u1: f32,
+        u2: Vec2,
+        w: &C::Wavelengths,
+    ) -> Option<BsdfSample<C::Sample>> {
+        let wo = warp::cosine_hemisphere(u2);
+        let pdf = warp::cosine_hemisphere_pdf(wo.z);
+        let weight = self.reflectance.eval(at, w);
+        (wi.z > 0.0 && pdf > 0.0 && !weight.is_black()).then_some(BsdfSample { wo, weight, pdf, eta: 1.0, delta: false })
+    }
+}

@@ -1,0 +1,169 @@
+//! What every material must do, looped over the family.
+
+use std::path::Path;
+
+use glam::{Vec2, Vec3};
+
+use super::*;
+use crate::color::{Rgb, Spectral};
+use crate::description::{Description, Options};
+use crate::math::{Frame, random, warp};
+
+/// Scene text of each material under test, a member of the family at least once.
+const MATERIALS: &[(&str, &str)] = &[
+    ("diffuse", r#"<bsdf type="diffuse"><rgb name="reflectance" value="1, 0.5, 0"/></bsdf>"#),
+    ("twosided", r#"<bsdf type="twosided"><bsdf type="diffuse"/><bsdf type="diffuse"><float name="reflectance" value="0.9"/></bsdf></bsdf>"#),
+];
+
+fn build(text: &str) -> Material<Rgb> {
+    let text = format!(r#"<scene version="3.0.0">{text}</scene>"#);
+    let scene = Description::parse(&text, Path::new("test.xml"), &Options::default()).unwrap();
+    let material = Material::build(&scene.root().children(Kind::Bsdf)[0], &Palettes::new(Rgb)).unwrap();
+    assert_eq!(scene.unread(), []);
+    material
+}
+
+fn interaction() -> Interaction<'static> {
+    Interaction {
+        t: 1.0,
+        position: Vec3::ZERO,
+        error: Vec3::ZERO,
+        normal: Vec3::Z,
+        frame: Frame::around(Vec3::Z),
+        uv: Vec2::splat(0.3),
+        dp_du: Vec3::X,
+        dp_dv: Vec3::Y,
+        wi: Vec3::Z,
+        time: 0.0,
+        shape: 0,
+        primitive: 0,
+        mesh: None,
+        barycentric: Vec2::ZERO,
+    }
+}
+
+fn uniforms(i: u32) -> (f32, Vec2) {
+    let u = |k| random::unit(random::bits(random::key(11, u64::from(i)), k));
+    (u(0), Vec2::new(u(1), u(2)))
+}
+
+/// Directions of incidence, from both sides.
+fn incidences() -> impl Iterator<Item = Vec3> {
+    [0.05f32, 0.4, 0.8, 1.0].into_iter().flat_map(|cos| {
+        let sin = (1.0 - cos * cos).sqrt();
+        [Vec3::new(sin, 0.0, cos), Vec3::new(0.0, -sin, -cos)]
+    })
+}
+
+#[test]
+fn every_material_of_the_family_is_tested() {
+    for name in Material::<Rgb>::NAMES {
+        assert!(MATERIALS.iter().any(|(n, _)| n == name), "add {name} to the table of materials under test");
+    }
+}
+
+#[test]
+fn every_material_reflects_no_more_than_it_receives() {
+    for (name, text) in MATERIALS {
+        let material = build(text);
+        for wi in incidences() {
+            let n = 20_000;
+            let mut sum = 0.0f64;
+            for i in 0..n {
+                let (u1, u2) = uniforms(i);
+                if let Some(sample) = material.sample(&interaction(), wi, u1, u2, &()) {
+                    assert!((sample.wo.length() - 1.0).abs() < 1e-4, "{name}: {:?}", sample.wo);
+                    // Light that is squeezed into a narrower cone by refraction carries more radiance.
+                    sum += f64::from(sample.weight.max_value() / sample.eta.powi(2)) / f64::from(n);
+                }
+            }
+            assert!(sum < 1.02, "{name} at {wi}: {sum}");
+        }
+    }
+}
+
+#[test]
+fn every_material_samples_what_it_evaluates() {
+    for (name, text) in MATERIALS {
+        let material = build(text);
+        for wi in incidences() {
+            // Delta lobes have no value to compare: samples that are not delta must agree one by one.
+            for i in 0..2000 {
+                let (u1, u2) = uniforms(i);
+                let Some(sample) = material.sample(&interaction(), wi, u1, u2, &()) else { continue };
+                if sample.delta {
+                    continue;
+                }
+                let value = material.eval(&interaction(), wi, sample.wo, &()).unwrap_or_else(|| {
+                    panic!("{name} at {wi} drew {} and evaluates it to nothing", sample.wo)
+                });
+                assert!((value.pdf / sample.pdf - 1.0).abs() < 1e-2, "{name} {wi} {}: {} {}", sample.wo, value.pdf, sample.pdf);
+                for c in 0..3 {
+                    let (a, b) = (value.value[c], sample.weight[c] * sample.pdf);
+                    assert!((a - b).abs() <= 1e-2 * (a.abs() + b.abs()) + 1e-6, "{name} {wi} {}: {a} {b}", sample.wo);
+                }
+            }
+        }
+    }
+}
+
+/// Pearson's χ² of sampled directions against the density, on a grid over the sphere.
+#[test]
+fn every_material_draws_directions_with_the_density_that_it_says() {
+    const ROWS: usize = 12;
+    const COLUMNS: usize = 16;
+    for (name, text) in MATERIALS {
+        let material = build(text);
+        for wi in incidences().filter(|wi| wi.z.abs() > 0.3) {
+            let n = 200_000;
+            let mut observed = vec![0.0f64; ROWS * COLUMNS];
+            let cell = |d: Vec3| {
+                let row = ((d.z * 0.5 + 0.5) * ROWS as f32) as usize;
+                let turn = d.y.atan2(d.x) / std::f32::consts::TAU + 0.5;
+                row.min(ROWS - 1) * COLUMNS + ((turn * COLUMNS as f32) as usize).min(COLUMNS - 1)
+            };
+            for i in 0..n {
+                let (u1, u2) = uniforms(i);
+                if let Some(sample) = material.sample(&interaction(), wi, u1, u2, &()).filter(|s| !s.delta) {
+                    observed[cell(sample.wo)] += 1.0;
+                }
+            }
+            // The density's integral over each cell, by a stratified grid of points.
+            let mut expected = vec![0.0f64; ROWS * COLUMNS];
+            let fine = 960;
+            for i in 0..fine * fine {
+                let u = Vec2::new((i / fine) as f32 + 0.5, (i % fine) as f32 + 0.5) / fine as f32;
+                let wo = warp::uniform_sphere(u);
+                if let Some(value) = material.eval(&interaction(), wi, wo, &()) {
+                    let share = 4.0 * std::f64::consts::PI / f64::from(fine * fine);
+                    expected[cell(wo)] += f64::from(value.pdf) * share * f64::from(n);
+                }
+            }
+            let (mut chi2, mut cells) = (0.0, 0.0);
+            for (o, e) in observed.iter().zip(&expected).filter(|(_, e)| **e > 10.0) {
+                chi2 += (o - e).powi(2) / e;
+                cells += 1.0;
+            }
+            // χ² of k cells has mean k and deviation √2k; 5 deviations and 2 % for the integration.
+            assert!(chi2 < cells * 1.3 + 5.0 * f64::sqrt(2.0 * cells) + 10.0, "{name} {wi}: χ² {chi2} over {cells}");
+        }
+    }
+}
+
+#[test]
+fn reflection_is_reciprocal() {
+    for (name, text) in MATERIALS {
+        let material = build(text);
+        for i in 0..2000 {
+            let (_, u) = uniforms(i);
+            let (_, v) = uniforms(i + 10_000);
+            let (a, b) = (warp::uniform_sphere(u), warp::uniform_sphere(v));
+            if a.z * b.z <= 0.01 {
+                continue; // transmission scales with the index of refraction
+            }
+            let f = |wi, wo: Vec3| material.eval(&interaction(), wi, wo, &()).map_or(0.0, |v| v.value[0] / wo.z.abs());
+            let (x, y) = (f(a, b), f(b, a));
+            assert!((x - y).abs() <= 1e-3 * (x + y) + 1e-6, "{name}: {x} {y}");
+        }
+    }
+}

@@ -1,0 +1,61 @@
+//! `twosided`: lets a one-sided material be seen from both sides; a second nested one covers the back.
+
+use glam::{Vec2, Vec3};
+
+use super::{Bsdf, BsdfSample, BsdfValue, Material, nested};
+use crate::color::ColorModel;
+use crate::description::Properties;
+use crate::error::Result;
+use crate::interaction::Interaction;
+use crate::texture::Palettes;
+
+/// A material for each side.
+#[derive(Clone, Debug)]
+pub struct TwoSided<C: ColorModel> {
+    front: Box<Material<C>>,
+    /// The front's where absent.
+    back: Option<Box<Material<C>>>,
+}
+
+impl<C: ColorModel> TwoSided<C> {
+    pub(super) fn build(properties: &Properties<'_>, palettes: &Palettes<C>) -> Result<Self> {
+        let mut sides = nested(properties, palettes, 1..=2)?.into_iter().map(Box::new);
+        let front = sides.next().expect("there is at least one");
+        Ok(Self { front, back: sides.next() })
+    }
+
+    /// The material on the side of `wi`, and the factor that brings it to the front.
+    fn side(&self, wi: Vec3) -> (&Material<C>, Vec3) {
+        match &self.back {
+            _ if wi.z >= 0.0 => (&self.front, Vec3::ONE),
+            Some(back) => (back, FLIP),
+            None => (&self.front, FLIP),
+        }
+    }
+}
+
+const FLIP: Vec3 = Vec3::new(1.0, 1.0, -1.0);
+
+impl<C: ColorModel> Bsdf<C> for TwoSided<C> {
+    fn is_smooth(&self) -> bool {
+        self.front.is_smooth() || self.back.as_ref().is_some_and(|b| b.is_smooth())
+    }
+
+    fn eval(&self, at: &Interaction<'_>, wi: Vec3, wo: Vec3, w: &C::Wavelengths) -> Option<BsdfValue<C::Sample>> {
+        let (material, flip) = self.side(wi);
+        material.eval(at, wi * flip, wo * flip, w)
+    }
+
+    fn sample(
+        &self,
+        at: &Interaction<'_>,
+        wi: Vec3,
+        u1: f32,
+        u2: Vec2,
+        w: &C::Wavelengths,
+    ) -> Option<BsdfSample<C::Sample>> {
+        let (material, flip) = self.side(wi);
+        let sample = material.sample(at, wi * flip, u1, u2, w)?;
+        Some(BsdfSample { wo: sample.wo * flip, ..sample })
+    }
+}
