@@ -9,11 +9,14 @@
 //! `flip_normals` turns geometric and vertex normals over ([`Mesh::flip_normals`]).
 
 mod generate;
+mod gltf;
 mod normals;
 mod obj;
 mod ply;
 mod read;
+mod serialized;
 mod source;
+mod stl;
 #[cfg(test)]
 mod tests;
 
@@ -21,6 +24,7 @@ use glam::{DMat4, DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
 pub use generate::{bumpy_sphere, cube, grid, rectangle, sphere};
+pub use gltf::{GltfCamera, GltfPart, GltfScene, Projection, read_gltf};
 pub use read::{FORMATS, Format, Loaded, ReadOptions, read};
 
 /// Triangles over shared vertices.

@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-use super::{Mesh, Repairs, obj, ply};
+use super::{Mesh, Repairs, gltf, obj, ply, serialized, stl};
 use crate::error::{Error, Location, Problem, Result};
 
 /// How to read a mesh file; the default is what Mitsuba does without properties.
@@ -47,6 +47,18 @@ pub const FORMATS: &[Format] = &[
         extensions: &["obj"],
         read: obj::read,
     },
+    Format {
+        extensions: &["serialized"],
+        read: serialized::read,
+    },
+    Format {
+        extensions: &["stl"],
+        read: stl::read,
+    },
+    Format {
+        extensions: &["gltf", "glb"],
+        read: gltf::read,
+    },
 ];
 
 /// Reads the mesh in the file `path`, whose extension says the format.
@@ -55,27 +67,41 @@ pub const FORMATS: &[Format] = &[
 /// Where the file cannot be opened, has an unknown extension or is malformed; the message says where.
 pub fn read(path: &Path, options: &ReadOptions) -> Result<Loaded> {
     let format = format_of(path)?;
+    let Opened { file, length } = open(path)?;
+    let input = Input {
+        path,
+        length,
+        reader: &mut &file,
+    };
+    Ok((format.read)(input, options)?.finish(path))
+}
+
+/// A regular file.
+pub(super) struct Opened {
+    pub(super) file: File,
+    /// Its bytes.
+    pub(super) length: u64,
+}
+
+/// Opens `path`, which must be a regular file: others may never end.
+pub(super) fn open(path: &Path) -> Result<Opened> {
     let file = File::open(path).map_err(|e| Error::system("open", path, &e))?;
     let about = file
         .metadata()
         .map_err(|e| Error::system("read", path, &e))?;
-    if !about.is_file() {
-        let what = if about.is_dir() {
-            "a folder"
-        } else {
-            "no regular file"
-        };
-        return Err(
-            Error::input(format!("a mesh file is wanted here, and this is {what}"))
-                .at(&Location::of_file(path)),
-        );
+    if about.is_file() {
+        return Ok(Opened {
+            file,
+            length: about.len(),
+        });
     }
-    let input = Input {
-        path,
-        length: about.len(),
-        reader: &mut &file,
+    let what = if about.is_dir() {
+        "a folder"
+    } else {
+        "no regular file"
     };
-    (format.read)(input, options)?.finish(path)
+    let message = format!("a mesh file is wanted here, and this is {what}");
+    Err(Error::input(message).at(&Location::of_file(path)))
 }
 
 fn format_of(path: &Path) -> Result<&'static Format> {
@@ -131,7 +157,8 @@ pub(super) struct Decoded {
 }
 
 impl Decoded {
-    fn finish(mut self, path: &Path) -> Result<Loaded> {
+    /// Checks the mesh, and says in the warnings what that mended.
+    pub(super) fn finish(mut self, path: &Path) -> Loaded {
         let Repairs {
             dropped_triangles,
             mended_normals,
@@ -158,17 +185,19 @@ impl Decoded {
         if self.mesh.triangles.is_empty() {
             self.warnings.push("the mesh has no triangles".to_owned());
         }
-        let place = Location::of_file(path);
-        let warnings = self.warnings.into_iter();
-        let warnings = warnings
-            .flat_map(|w| Error::input(w).at(&place).problems().to_vec())
-            .collect();
-        Ok(Loaded {
+        Loaded {
             mesh: self.mesh,
             dropped_triangles,
-            warnings,
-        })
+            warnings: warnings(path, self.warnings),
+        }
     }
+}
+
+/// `messages` as problems of the file `path`.
+pub(super) fn warnings(path: &Path, messages: Vec<String>) -> Vec<Problem> {
+    let place = Location::of_file(path);
+    let problems = messages.into_iter().map(|m| Error::input(m).at(&place));
+    problems.flat_map(|e| e.problems().to_vec()).collect()
 }
 
 #[cfg(test)]
@@ -190,6 +219,6 @@ pub(super) mod testing {
             length: bytes.len() as u64,
             reader: &mut reader,
         };
-        (format_of(path)?.read)(input, options)?.finish(path)
+        Ok((format_of(path)?.read)(input, options)?.finish(path))
     }
 }

@@ -81,17 +81,6 @@ impl<'a> Source<'a> {
         Ok(())
     }
 
-    /// The next `N` bytes.
-    pub(super) fn array<const N: usize>(&mut self) -> Result<[u8; N]> {
-        match self.peek(N)?.first_chunk::<N>().copied() {
-            Some(bytes) => {
-                self.consume(N);
-                Ok(bytes)
-            }
-            None => Err(self.error("the file ends too early")),
-        }
-    }
-
     /// The next line, without its end.
     pub(super) fn line(&mut self) -> Result<String> {
         let shown = self.peek(LONGEST_LINE)?;
