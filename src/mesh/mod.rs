@@ -1,1 +1,328 @@
-//! (being written)
+//! Triangle meshes: one [`Mesh`] type, a reader a file format, vertex normals and generated shapes. A mesh
+//! is arrays of vertices and triangles as they stand in the file, in the vertex order of Mitsuba 3.9.1.
+//!
+//! What a `shape` of Mitsuba does with a mesh, probed on its wheel, and the method that does it here:
+//! `to_world` moves the vertices and never changes the winding, so that a mirroring transform turns the
+//! geometric normals over ([`Mesh::transform`]); normals of the file go through the inverse transpose;
+//! missing normals are computed *after* that transform ([`Mesh::compute_normals`]), so that they agree
+//! with the turned faces; `face_normals` drops the vertex normals ([`Mesh::drop_normals`]);
+//! `flip_normals` turns geometric and vertex normals over ([`Mesh::flip_normals`]).
+
+mod generate;
+mod gltf;
+mod normals;
+mod obj;
+mod ply;
+mod read;
+mod serialized;
+mod source;
+mod stl;
+#[cfg(test)]
+mod tests;
+
+use glam::{DMat4, DVec3, Vec2, Vec3};
+use rayon::prelude::*;
+
+pub use generate::{bumpy_sphere, cube, grid, rectangle, sphere};
+pub use gltf::{GltfCamera, GltfPart, GltfScene, Projection, read_gltf};
+pub use read::{FORMATS, Format, Loaded, ReadOptions, read};
+
+/// Triangles over shared vertices.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Mesh {
+    /// Vertices, in object space, or in world space after [`Mesh::transform`]. Those of triangles are finite
+    /// after [`Mesh::check`]; a vertex that no triangle has may hold anything.
+    pub positions: Vec<Vec3>,
+    /// One a vertex, of unit length; empty: the face normal is used.
+    pub normals: Vec<Vec3>,
+    /// Texture coordinates, one a vertex; empty: none.
+    pub uvs: Vec<Vec2>,
+    /// Counter-clockwise corners seen from outside: indices into `positions`, always in range.
+    pub triangles: Vec<[u32; 3]>,
+    /// Named data for `mesh_attribute` textures.
+    pub attributes: Vec<Attribute>,
+}
+
+/// Named data on the vertices or faces of a mesh.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Attribute {
+    /// The name with its prefix, as the scene file says it: `vertex_color`, `face_temperature`.
+    pub name: String,
+    /// Numbers a vertex or face: 1, 3 or 4.
+    pub channels: usize,
+    /// What a row of `values` belongs to.
+    pub per: Per,
+    /// Rows of `channels` numbers.
+    pub values: Vec<f32>,
+}
+
+/// What an [`Attribute`] belongs to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Per {
+    /// A row a vertex, interpolated over the triangle.
+    Vertex,
+    /// A row a triangle.
+    Face,
+}
+
+/// What [`Mesh::check`] mended.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Repairs {
+    /// Triangles dropped because a corner is not finite.
+    pub dropped_triangles: usize,
+    /// Normals of no length or not finite, replaced by computed ones.
+    pub mended_normals: usize,
+    /// Texture coordinates that were not finite, replaced by 0.
+    pub mended_uvs: usize,
+}
+
+/// Vertices or triangles that one task works on: enough to make the task worth its while.
+const GRAIN: usize = 1 << 14;
+
+impl Mesh {
+    /// The least box around all triangles, as its low and high corner; `None` without triangles.
+    pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
+        self.triangles
+            .par_chunks(GRAIN)
+            .map(|triangles| {
+                let corners = triangles.iter().flat_map(|t| self.corners(t));
+                corners.fold(
+                    (Vec3::INFINITY, Vec3::NEG_INFINITY),
+                    |(low, high), corner| (low.min(corner), high.max(corner)),
+                )
+            })
+            .reduce_with(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+    }
+
+    /// The sum of the triangles' areas, in squared scene units.
+    pub fn area(&self) -> f64 {
+        let partial: Vec<f64> = self
+            .triangles
+            .par_chunks(GRAIN)
+            .map(|triangles| {
+                let doubled = triangles.iter().map(|t| {
+                    let [a, b, c] = self.corners(t).map(Vec3::as_dvec3);
+                    (b - a).cross(c - a).length()
+                });
+                doubled.sum::<f64>() / 2.0
+            })
+            .collect();
+        // Added in order, so that the sum is the same whatever the threads.
+        partial.iter().sum()
+    }
+
+    /// Moves the vertices by the affine `matrix`, computed in f64, and turns the normals by its inverse
+    /// transpose. The winding stays, also under a mirroring matrix: see the module's introduction.
+    pub fn transform(&mut self, matrix: &DMat4) {
+        self.positions
+            .par_iter_mut()
+            .with_min_len(GRAIN)
+            .for_each(|p| *p = matrix.transform_point3(p.as_dvec3()).as_vec3());
+        // The cofactors are det · inverse transpose, and exist where the inverse does not.
+        let [x, y, z] = [0, 1, 2].map(|i| matrix.col(i).truncate());
+        let side = if x.dot(y.cross(z)) < 0.0 { -1.0 } else { 1.0 };
+        let cofactors = [y.cross(z), z.cross(x), x.cross(y)].map(|c| c * side);
+        self.normals
+            .par_iter_mut()
+            .with_min_len(GRAIN)
+            .for_each(|n| {
+                let turned = n.x as f64 * cofactors[0]
+                    + n.y as f64 * cofactors[1]
+                    + n.z as f64 * cofactors[2];
+                *n = unit_or(turned, *n);
+            });
+    }
+
+    /// Replaces the vertex normals by the mean of the faces' normals, weighted with the faces' angles at the
+    /// vertex. Call it after [`Mesh::transform`], as Mitsuba does.
+    pub fn compute_normals(&mut self) {
+        self.normals = normals::angle_weighted(&self.positions, &self.triangles);
+    }
+
+    /// Shades with the geometric normal (`face_normals`).
+    pub fn drop_normals(&mut self) {
+        self.normals = Vec::new();
+    }
+
+    /// Turns the surface's outside in (`flip_normals`): the winding and the vertex normals.
+    pub fn flip_normals(&mut self) {
+        for triangle in &mut self.triangles {
+            triangle.swap(1, 2);
+        }
+        for normal in &mut self.normals {
+            *normal = -*normal;
+        }
+    }
+
+    /// Bytes that the mesh holds on the heap.
+    pub fn bytes(&self) -> usize {
+        let attributes = self.attributes.iter().map(|a| {
+            size_of::<Attribute>() + a.name.capacity() + a.values.capacity() * size_of::<f32>()
+        });
+        self.positions.capacity() * size_of::<Vec3>()
+            + self.normals.capacity() * size_of::<Vec3>()
+            + self.uvs.capacity() * size_of::<Vec2>()
+            + self.triangles.capacity() * size_of::<[u32; 3]>()
+            + attributes.sum::<usize>()
+    }
+
+    /// Drops triangles with a corner that is not finite, and mends normals and texture coordinates that are
+    /// unusable. The readers have called it; call it again after a transform that may overflow.
+    ///
+    /// # Panics
+    /// Where an index or the length of an array breaks what the fields promise.
+    pub fn check(&mut self) -> Repairs {
+        let vertices = self.positions.len();
+        assert!(
+            self.normals.is_empty() || self.normals.len() == vertices,
+            "one normal a vertex"
+        );
+        assert!(
+            self.uvs.is_empty() || self.uvs.len() == vertices,
+            "one uv a vertex"
+        );
+        Repairs {
+            dropped_triangles: self.drop_unfinite_triangles(),
+            mended_normals: self.mend_normals(),
+            mended_uvs: self.mend_uvs(),
+        }
+    }
+
+    /// The corners of `triangle`.
+    pub fn corners(&self, triangle: &[u32; 3]) -> [Vec3; 3] {
+        triangle.map(|i| self.positions[i as usize])
+    }
+
+    /// Appends `other`, whose vertices follow those of `self`. What one has and the other lacks is lost,
+    /// but for normals: they are filled with face normals, for which such a part's vertices are unshared.
+    /// Attributes are dropped unless both have the same.
+    pub(crate) fn append(&mut self, mut other: Mesh) {
+        if self.triangles.is_empty() {
+            *self = other;
+            return;
+        }
+        if self.normals.is_empty() != other.normals.is_empty() {
+            let flat = if self.normals.is_empty() {
+                &mut *self
+            } else {
+                &mut other
+            };
+            flat.unshare_vertices();
+        }
+        let first = u32::try_from(self.positions.len()).expect("readers keep indices in 32 bits");
+        if self.uvs.is_empty() || other.uvs.is_empty() {
+            self.uvs.clear();
+        } else {
+            self.uvs.append(&mut other.uvs);
+        }
+        let shape = |m: &Mesh| -> Vec<_> {
+            let of = |a: &Attribute| (a.name.clone(), a.channels, a.per);
+            m.attributes.iter().map(of).collect()
+        };
+        if shape(self) == shape(&other) {
+            for (mine, mut theirs) in self.attributes.iter_mut().zip(other.attributes) {
+                mine.values.append(&mut theirs.values);
+            }
+        } else {
+            self.attributes.clear();
+        }
+        self.positions.append(&mut other.positions);
+        self.normals.append(&mut other.normals);
+        let shifted = other.triangles.iter().map(|t| t.map(|i| first + i));
+        self.triangles.extend(shifted);
+    }
+
+    /// Gives each triangle vertices of its own, with its face normal.
+    fn unshare_vertices(&mut self) {
+        let order: Vec<usize> = self
+            .triangles
+            .iter()
+            .flatten()
+            .map(|&i| i as usize)
+            .collect();
+        self.normals = (self.triangles.iter())
+            .flat_map(|t| [normals::face_normal(self.corners(t)); 3])
+            .collect();
+        self.positions = order.iter().map(|&i| self.positions[i]).collect();
+        if !self.uvs.is_empty() {
+            self.uvs = order.iter().map(|&i| self.uvs[i]).collect();
+        }
+        for attribute in self.attributes.iter_mut().filter(|a| a.per == Per::Vertex) {
+            let row = |i: usize| i * attribute.channels..(i + 1) * attribute.channels;
+            attribute.values = order
+                .iter()
+                .flat_map(|&i| attribute.values[row(i)].to_vec())
+                .collect();
+        }
+        for (i, triangle) in (0_u32..).zip(&mut self.triangles) {
+            *triangle = [3 * i, 3 * i + 1, 3 * i + 2];
+        }
+    }
+
+    fn drop_unfinite_triangles(&mut self) -> usize {
+        let before = self.triangles.len();
+        if self
+            .positions
+            .par_iter()
+            .with_min_len(GRAIN)
+            .all(|p| p.is_finite())
+        {
+            return 0;
+        }
+        let positions = &self.positions;
+        let keep: Vec<bool> = (self.triangles.iter())
+            .map(|t| t.iter().all(|&i| positions[i as usize].is_finite()))
+            .collect();
+        let mut kept = keep.iter();
+        self.triangles
+            .retain(|_| *kept.next().expect("one flag a triangle"));
+        for attribute in self.attributes.iter_mut().filter(|a| a.per == Per::Face) {
+            let channels = attribute.channels;
+            let mut i = 0;
+            attribute.values.retain(|_| {
+                i += 1;
+                keep[(i - 1) / channels]
+            });
+        }
+        before - self.triangles.len()
+    }
+
+    fn mend_normals(&mut self) -> usize {
+        let count = (self.normals.par_iter_mut().with_min_len(GRAIN))
+            .filter_map(|n| {
+                *n = unit_or(n.as_dvec3(), Vec3::ZERO);
+                (*n == Vec3::ZERO).then_some(())
+            })
+            .count();
+        if count > 0 {
+            let computed = normals::angle_weighted(&self.positions, &self.triangles);
+            for (normal, computed) in self.normals.iter_mut().zip(computed) {
+                if *normal == Vec3::ZERO {
+                    *normal = computed;
+                }
+            }
+        }
+        count
+    }
+
+    fn mend_uvs(&mut self) -> usize {
+        let mut count = 0;
+        for uv in self.uvs.iter_mut().filter(|uv| !uv.is_finite()) {
+            *uv = Vec2::ZERO;
+            count += 1;
+        }
+        count
+    }
+
+    /// Turns texture coordinates over, `v` → `1 − v`.
+    fn flip_uvs(&mut self) {
+        for uv in &mut self.uvs {
+            uv.y = 1.0 - uv.y;
+        }
+    }
+}
+
+/// `v` at unit length, or `otherwise` where it has no direction.
+fn unit_or(v: DVec3, otherwise: Vec3) -> Vec3 {
+    v.try_normalize().map_or(otherwise, DVec3::as_vec3)
+}

@@ -1,0 +1,267 @@
+//! Wavefront OBJ. All groups and objects of a file make one mesh, as in Mitsuba, so that normals are smooth
+//! across them (`tobj` splits the file there, and reports neither lines nor missing indices: the tests use
+//! it to compare). Corners `v/vt/vn` that are equal share a vertex; vertices stand in the order in which
+//! faces first name them. Polygons are fans around their first corner; negative indices count back from
+//! the last; lines that are neither `v`, `vt`, `vn` nor `f` are passed over.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use glam::{Vec2, Vec3};
+
+use super::Mesh;
+use super::read::{Decoded, Input, ReadOptions};
+use crate::error::{Error, Location, Result};
+
+/// What a line gives, or what is wrong with it, in words.
+type OfLine<T> = std::result::Result<T, String>;
+
+/// No vertex, or no index in a corner.
+const NONE: u32 = u32::MAX;
+
+pub(super) fn read(input: Input<'_>, options: &ReadOptions) -> Result<Decoded> {
+    let path = input.path;
+    let mut bytes = input.bytes()?;
+    join_continued_lines(&mut bytes);
+    let mut obj = Obj::default();
+    let mut start = 0;
+    for line in bytes.split(|&b| b == b'\n') {
+        obj.line(line).map_err(|message| {
+            let before = bytes[..start]
+                .iter()
+                .filter(|&&b| b == b'\n' || b == JOINED)
+                .count();
+            let line = u32::try_from(before + 1).unwrap_or(0);
+            Error::input(message).at(&Location::of_line(path, line))
+        })?;
+        start += line.len() + 1;
+    }
+    check_text(&bytes, &obj, path)?;
+    Ok(obj.finish(options))
+}
+
+/// Stands for the line end after a backslash: a blank that no file has otherwise.
+const JOINED: u8 = b'\x0c';
+
+/// A backslash at the end of a line continues it.
+fn join_continued_lines(bytes: &mut [u8]) {
+    for end in 1..bytes.len() {
+        if bytes[end] == b'\n' {
+            let last = if end > 1 && bytes[end - 1] == b'\r' {
+                end - 2
+            } else {
+                end - 1
+            };
+            if bytes[last] == b'\\' {
+                bytes[last] = b' ';
+                bytes[end] = JOINED;
+            }
+        }
+    }
+}
+
+/// A file of which nothing was understood is no OBJ.
+fn check_text(bytes: &[u8], obj: &Obj, path: &Path) -> Result<()> {
+    if obj.positions.is_empty() {
+        let message = if bytes.is_empty() {
+            "the file is empty"
+        } else {
+            "the file has no vertices"
+        };
+        return Err(Error::input(message)
+            .at(&Location::of_file(path))
+            .help("an OBJ file has lines such as \"v 0 0 1\" and \"f 1 2 3\""));
+    }
+    Ok(())
+}
+
+#[derive(Default)]
+struct Obj {
+    positions: Vec<Vec3>,
+    uvs: Vec<Vec2>,
+    normals: Vec<Vec3>,
+    /// Of each vertex of the mesh: position, uv and normal, `NONE` where it has none.
+    vertices: Vec<[u32; 3]>,
+    /// The first vertex made for each position.
+    first: Vec<u32>,
+    /// The other vertices.
+    others: HashMap<[u32; 3], u32>,
+    triangles: Vec<[u32; 3]>,
+    /// Faces of fewer than three corners.
+    degenerate: usize,
+}
+
+impl Obj {
+    fn line(&mut self, line: &[u8]) -> OfLine<()> {
+        let mut words = line
+            .split(u8::is_ascii_whitespace)
+            .filter(|w| !w.is_empty());
+        match words.next() {
+            Some(b"v") => {
+                let position = numbers(&mut words, 3)?;
+                new_index(self.positions.len())?;
+                self.positions.push(Vec3::from_array(position));
+            }
+            Some(b"vt") => {
+                let [u, v, _] = numbers(&mut words, 1)?;
+                self.uvs.push(Vec2::new(u, v));
+            }
+            Some(b"vn") => self.normals.push(Vec3::from_array(numbers(&mut words, 3)?)),
+            Some(b"f") => return self.face(words),
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn face<'a>(&mut self, words: impl Iterator<Item = &'a [u8]>) -> OfLine<()> {
+        let mut corners = 0;
+        let (mut first, mut previous) = (NONE, NONE);
+        for word in words.take_while(|w| w[0] != b'#') {
+            let corner = self.corner(word)?;
+            let vertex = self.vertex(corner)?;
+            if corners == 0 {
+                first = vertex;
+            } else if corners > 1 {
+                self.triangles.push([first, previous, vertex]);
+            }
+            previous = vertex;
+            corners += 1;
+        }
+        self.degenerate += usize::from(corners < 3);
+        Ok(())
+    }
+
+    /// The indices that `v`, `v/vt`, `v//vn` or `v/vt/vn` name, from 0.
+    fn corner(&self, word: &[u8]) -> OfLine<[u32; 3]> {
+        let kinds = [
+            ("vertex", self.positions.len()),
+            ("texture coordinate", self.uvs.len()),
+            ("normal", self.normals.len()),
+        ];
+        let mut corner = [NONE; 3];
+        let mut parts = word.split(|&b| b == b'/');
+        for (i, (kind, count)) in kinds.into_iter().enumerate() {
+            match parts.next() {
+                None => break,
+                Some([]) if i > 0 => {}
+                Some(part) => corner[i] = index(part, count, kind, word)?,
+            }
+        }
+        match parts.next() {
+            None => Ok(corner),
+            Some(_) => Err(malformed(word)),
+        }
+    }
+
+    /// The vertex of the mesh for a corner.
+    fn vertex(&mut self, corner: [u32; 3]) -> OfLine<u32> {
+        self.first.resize(self.positions.len(), NONE);
+        let next = new_index(self.vertices.len())?;
+        let first = &mut self.first[corner[0] as usize];
+        let vertex = if *first == NONE {
+            *first = next;
+            next
+        } else if self.vertices[*first as usize] == corner {
+            return Ok(*first);
+        } else {
+            *self.others.entry(corner).or_insert(next)
+        };
+        if vertex == next {
+            self.vertices.push(corner);
+        }
+        Ok(vertex)
+    }
+
+    fn finish(self, options: &ReadOptions) -> Decoded {
+        let any = |part: usize| self.vertices.iter().any(|v| v[part] != NONE);
+        let mut mesh = Mesh {
+            positions: self
+                .vertices
+                .iter()
+                .map(|v| self.positions[v[0] as usize])
+                .collect(),
+            triangles: self.triangles,
+            ..Mesh::default()
+        };
+        let mut warnings = Vec::new();
+        if any(1) {
+            let uv = |v: &[u32; 3]| self.uvs.get(v[1] as usize).copied().unwrap_or_default();
+            mesh.uvs = self.vertices.iter().map(uv).collect();
+            if options.flip_tex_coords.unwrap_or(true) {
+                mesh.flip_uvs();
+            }
+        }
+        if any(2) {
+            // Those that are missing stay 0, which the check of the mesh mends.
+            let normal =
+                |v: &[u32; 3]| self.normals.get(v[2] as usize).copied().unwrap_or_default();
+            mesh.normals = self.vertices.iter().map(normal).collect();
+        }
+        if self.degenerate > 0 {
+            let n = self.degenerate;
+            warnings.push(format!(
+                "{n} faces left out: they have fewer than three corners"
+            ));
+        }
+        Decoded { mesh, warnings }
+    }
+}
+
+/// The index of one more thing where there are `count`.
+fn new_index(count: usize) -> OfLine<u32> {
+    let index = u32::try_from(count).ok().filter(|&i| i != NONE);
+    index.ok_or_else(|| "there are more vertices than 32-bit indices reach".to_owned())
+}
+
+/// The first three of `words` as numbers, of which `least` must be there.
+fn numbers<'a>(words: &mut impl Iterator<Item = &'a [u8]>, least: usize) -> OfLine<[f32; 3]> {
+    let mut numbers = [0.0; 3];
+    for (i, number) in numbers.iter_mut().enumerate() {
+        match words.next().filter(|w| w[0] != b'#') {
+            Some(word) => {
+                *number =
+                    parse(word).ok_or_else(|| format!("a number is wanted, not {}", shown(word)))?
+            }
+            None if i < least => {
+                return Err(format!("{least} numbers are wanted, and there are {i}"));
+            }
+            None => break,
+        }
+    }
+    Ok(numbers)
+}
+
+/// The index from 0 that `part` of `word` says, of `count` things called `kind`.
+fn index(part: &[u8], count: usize, kind: &str, word: &[u8]) -> OfLine<u32> {
+    let said: i64 = parse(part).ok_or_else(|| malformed(word))?;
+    let length = i64::try_from(count).unwrap_or(i64::MAX);
+    let index = if said > 0 {
+        said - 1
+    } else {
+        said.saturating_add(length)
+    };
+    if said == 0 || !(0..length).contains(&index) {
+        return Err(format!(
+            "{kind} {said} is out of range; {count} stand before this line"
+        ));
+    }
+    u32::try_from(index)
+        .ok()
+        .filter(|&i| i != NONE)
+        .ok_or_else(|| format!("{kind} {said} is beyond 32 bits"))
+}
+
+fn malformed(word: &[u8]) -> String {
+    format!(
+        "a corner is wanted, such as 1 or 1/2/3, not {}",
+        shown(word)
+    )
+}
+
+fn parse<T: std::str::FromStr>(word: &[u8]) -> Option<T> {
+    std::str::from_utf8(word).ok()?.parse().ok()
+}
+
+fn shown(word: &[u8]) -> String {
+    format!("{:?}", String::from_utf8_lossy(&word[..word.len().min(32)]))
+}

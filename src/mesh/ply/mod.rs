@@ -1,0 +1,497 @@
+//! PLY: any order and type of properties, ASCII and binary of both endians. Rows of fixed size are decoded
+//! column by column straight from the buffer; ASCII rows, and those with lists, are first written out as
+//! rows of f64, so that one decoder serves all. Polygons are fans around their first corner; elements other
+//! than `vertex` and `face` are skipped. Texture coordinates are `u v`, `s t` or `texture_u texture_v`.
+
+mod attributes;
+mod header;
+
+use glam::{Vec2, Vec3};
+
+use super::read::{Decoded, Input, ReadOptions};
+use super::source::Source;
+use super::{Attribute, Mesh, Per};
+use crate::error::Result;
+use attributes::Plan;
+use header::{Element, Encoding, Header, Kind, Scalar};
+
+/// Rows that are written out at a time where they are not of fixed size.
+const ROWS: u64 = 1 << 10;
+
+pub(super) fn read(input: Input<'_>, options: &ReadOptions) -> Result<Decoded> {
+    let mut source = Source::new(input);
+    let header = Header::read(&mut source)?;
+    for wanted in ["vertex", "face"] {
+        if !header.elements.iter().any(|e| e.name == wanted) {
+            return Err(source
+                .error_at_last_line(format!("the file has no element {wanted:?}"))
+                .help("a mesh needs vertices and faces"));
+        }
+    }
+    if header.encoding != Encoding::Ascii {
+        source.binary();
+    }
+    let mut ply = Ply {
+        source,
+        encoding: header.encoding,
+        vertices: 0,
+        decoded: Decoded::default(),
+    };
+    for element in &header.elements {
+        ply.check_length(element)?;
+        if element.name == "vertex" {
+            ply.vertices = element.count;
+        }
+    }
+    let mut wanted = 2;
+    for element in &header.elements {
+        match element.name.as_str() {
+            "vertex" => ply.read_vertices(element)?,
+            "face" => ply.read_faces(element)?,
+            _ => {
+                ply.skip(element)?;
+                continue;
+            }
+        }
+        wanted -= 1;
+        if wanted == 0 {
+            break;
+        }
+    }
+    let mut decoded = ply.decoded;
+    if options.flip_tex_coords.unwrap_or(false) {
+        decoded.mesh.flip_uvs();
+    }
+    Ok(decoded)
+}
+
+struct Ply<'a> {
+    source: Source<'a>,
+    encoding: Encoding,
+    /// As the header promises them.
+    vertices: u64,
+    decoded: Decoded,
+}
+
+/// One property in rows of bytes.
+#[derive(Clone, Copy)]
+struct Column {
+    offset: usize,
+    scalar: Scalar,
+}
+
+/// Rows of `stride` bytes.
+#[derive(Clone, Copy)]
+struct Rows<'a> {
+    bytes: &'a [u8],
+    stride: usize,
+    encoding: Encoding,
+}
+
+impl Rows<'_> {
+    /// The `columns` of each row.
+    fn get<const N: usize>(&self, columns: [Column; N], mut each: impl FnMut([f32; N])) {
+        let rows = self.bytes.chunks_exact(self.stride);
+        if self.encoding == Encoding::LittleEndian
+            && columns.iter().all(|c| c.scalar == Scalar::F32)
+        {
+            let offsets = columns.map(|c| c.offset);
+            for row in rows {
+                each(offsets.map(|o| {
+                    let bytes = row[o..].first_chunk().expect("the column lies in the row");
+                    f32::from_le_bytes(*bytes)
+                }));
+            }
+        } else {
+            for row in rows {
+                each(columns.map(|c| c.scalar.decode(&row[c.offset..], self.encoding) as f32));
+            }
+        }
+    }
+}
+
+impl Ply<'_> {
+    /// Refuses a count of rows that the rest of the file cannot hold.
+    fn check_length(&self, element: &Element) -> Result<()> {
+        let Element { name, count, .. } = element;
+        // The last row of an ASCII file may lack its end of line.
+        let least = count
+            .saturating_mul(element.least_row(self.encoding))
+            .saturating_sub(1);
+        let remaining = self.source.remaining();
+        if least > remaining {
+            return Err(self.source.error(format!(
+                "the header promises {count} rows of element {name:?}, at least {least} bytes; \
+                 {remaining} bytes follow it"
+            )));
+        }
+        if name == "vertex" && *count > u64::from(u32::MAX) {
+            return Err(self.source.error(format!(
+                "{count} vertices are more than 32-bit indices reach"
+            )));
+        }
+        Ok(())
+    }
+
+    fn read_vertices(&mut self, element: &Element) -> Result<()> {
+        let find = |names: &[&[&str]]| -> Option<Vec<usize>> {
+            names.iter().map(|names| element.scalar(names)).collect()
+        };
+        let Some(position) = find(&[&["x"], &["y"], &["z"]]) else {
+            return Err(self
+                .source
+                .error("element \"vertex\" needs the properties x, y and z"));
+        };
+        let normal = find(&[&["nx"], &["ny"], &["nz"]]);
+        let uv = find(&[&["u"], &["v"]])
+            .or_else(|| find(&[&["s"], &["t"]]))
+            .or_else(|| find(&[&["texture_u"], &["texture_v"]]));
+        let named = [Some(&position), normal.as_ref(), uv.as_ref()];
+        let taken: Vec<usize> = named.into_iter().flatten().flatten().copied().collect();
+        let plans = attributes::plan(element, "vertex_", &taken, &mut self.decoded.warnings);
+
+        let (stride, columns) = self.columns(element);
+        let place = |properties: &[usize]| -> Vec<Column> {
+            properties.iter().map(|&i| columns[i]).collect()
+        };
+        let position = triple(&place(&position));
+        let normal = normal.map(|n| triple(&place(&n)));
+        let uv = uv.map(|uv| [columns[uv[0]], columns[uv[1]]]);
+        let attributes: Vec<Vec<Column>> = plans.iter().map(|p| place(&p.properties)).collect();
+
+        let count = usize::try_from(element.count).expect("the file holds so many rows");
+        let mut mesh = Mesh {
+            attributes: start(plans, Per::Vertex, count),
+            ..Mesh::default()
+        };
+        mesh.positions.reserve_exact(count);
+        mesh.normals.reserve_exact(normal.map_or(0, |_| count));
+        mesh.uvs.reserve_exact(uv.map_or(0, |_| count));
+        self.each_rows(element, stride, |rows| {
+            rows.get(position, |p| mesh.positions.push(Vec3::from_array(p)));
+            if let Some(normal) = normal {
+                rows.get(normal, |n| mesh.normals.push(Vec3::from_array(n)));
+            }
+            if let Some(uv) = uv {
+                rows.get(uv, |uv| mesh.uvs.push(Vec2::from_array(uv)));
+            }
+            for (attribute, columns) in mesh.attributes.iter_mut().zip(&attributes) {
+                for row in rows.bytes.chunks_exact(rows.stride) {
+                    let values = columns
+                        .iter()
+                        .map(|c| c.scalar.decode(&row[c.offset..], rows.encoding) as f32);
+                    attribute.values.extend(values);
+                }
+            }
+        })?;
+        mesh.triangles = std::mem::take(&mut self.decoded.mesh.triangles);
+        mesh.attributes.append(&mut self.decoded.mesh.attributes);
+        self.decoded.mesh = mesh;
+        Ok(())
+    }
+
+    /// The row's length and each property's place in it, in what [`Ply::each_rows`] gives.
+    fn columns(&self, element: &Element) -> (usize, Vec<Column>) {
+        let fixed = self.encoding != Encoding::Ascii && element.stride().is_some();
+        let mut stride = 0;
+        let columns = element.properties.iter().map(|property| {
+            let scalar = match property.kind {
+                Kind::Scalar(scalar) if fixed => scalar,
+                _ => Scalar::F64,
+            };
+            let offset = stride;
+            stride += scalar.size();
+            Column { offset, scalar }
+        });
+        let columns = columns.collect();
+        (stride, columns)
+    }
+
+    /// Shows all rows of `element`, some at a time.
+    fn each_rows(
+        &mut self,
+        element: &Element,
+        stride: usize,
+        mut each: impl FnMut(Rows<'_>),
+    ) -> Result<()> {
+        let mut left = element.count;
+        let encoding = self.encoding;
+        if encoding != Encoding::Ascii && element.stride().is_some() {
+            while left > 0 {
+                let shown = self.source.peek(stride)?;
+                let fitting =
+                    (shown.len() / stride).min(usize::try_from(left).unwrap_or(usize::MAX));
+                if fitting == 0 {
+                    return Err(self.ends_early(element, left));
+                }
+                let bytes = &shown[..fitting * stride];
+                each(Rows {
+                    bytes,
+                    stride,
+                    encoding,
+                });
+                self.source.consume(fitting * stride);
+                left -= fitting as u64;
+            }
+            return Ok(());
+        }
+        let (mut bytes, mut scalars) = (Vec::new(), Vec::new());
+        while left > 0 {
+            bytes.clear();
+            let some = left.min(ROWS);
+            for _ in 0..some {
+                self.read_row(element, &mut scalars, None)?;
+                bytes.extend(scalars.iter().flat_map(|s: &f64| s.to_le_bytes()));
+            }
+            each(Rows {
+                bytes: &bytes,
+                stride,
+                encoding: Encoding::LittleEndian,
+            });
+            left -= some;
+        }
+        Ok(())
+    }
+
+    fn read_faces(&mut self, element: &Element) -> Result<()> {
+        let is_corners =
+            |p: &header::Property| ["vertex_indices", "vertex_index"].contains(&p.name.as_str());
+        let Some(corners) = element.properties.iter().position(is_corners) else {
+            return Err(self
+                .source
+                .error("element \"face\" has no corners")
+                .help("it needs a property \"list uchar int vertex_indices\""));
+        };
+        let Kind::List { count, item } = element.properties[corners].kind else {
+            return Err(self.source.error("the corners of a face must be a list"));
+        };
+        if !item.is_integer() {
+            return Err(self
+                .source
+                .error("the corners of a face must be whole numbers"));
+        }
+        let plans = attributes::plan(element, "face_", &[], &mut self.decoded.warnings);
+        let sources: Vec<Vec<usize>> = plans.iter().map(|p| p.properties.clone()).collect();
+        // A face of three corners takes so many bytes; fans only grow beyond it.
+        let triangle = element.least_row(self.encoding)
+            + 3 * if self.encoding == Encoding::Ascii {
+                2
+            } else {
+                item.size() as u64
+            };
+        let fitting = element.count.min(self.source.remaining() / triangle + 1);
+        let fitting = usize::try_from(fitting).expect("the file holds so many rows");
+        let mut attributes = start(plans, Per::Face, fitting);
+        let mut triangles: Vec<[u32; 3]> = Vec::with_capacity(fitting);
+
+        let common = element.properties.len() == 1
+            && count.size() == 1
+            && item.size() == 4
+            && self.encoding != Encoding::Ascii;
+        let (mut scalars, mut polygon) = (Vec::new(), Vec::new());
+        let (mut degenerate, mut face) = (0_u64, 0);
+        while face < element.count {
+            if common {
+                face += self.read_triangles(element.count - face, &mut triangles)?;
+                if face == element.count {
+                    break;
+                }
+            }
+            self.read_row(element, &mut scalars, Some((corners, &mut polygon)))
+                .map_err(|e| {
+                    e.help(format!(
+                        "{} faces were promised, and this is face {face}",
+                        element.count
+                    ))
+                })?;
+            if let Some(&wrong) = polygon
+                .iter()
+                .find(|&&i| !(i >= 0.0 && i < self.vertices as f64 && i.fract() == 0.0))
+            {
+                return Err(self.out_of_range(face, wrong));
+            }
+            degenerate += u64::from(polygon.len() < 3);
+            // In range of `vertices`, which fits into 32 bits.
+            let at = |i: usize| polygon[i] as u32;
+            for i in 2..polygon.len() {
+                triangles.push([at(0), at(i - 1), at(i)]);
+                for (attribute, sources) in attributes.iter_mut().zip(&sources) {
+                    attribute
+                        .values
+                        .extend(sources.iter().map(|&i| scalars[i] as f32));
+                }
+            }
+            face += 1;
+        }
+        if degenerate > 0 {
+            let warning =
+                format!("{degenerate} faces left out: they have fewer than three corners");
+            self.decoded.warnings.push(warning);
+        }
+        self.decoded.mesh.triangles = triangles;
+        self.decoded.mesh.attributes.append(&mut attributes);
+        Ok(())
+    }
+
+    /// The common layout, a byte and three 32-bit indices: reads triangles until a face is none, and
+    /// returns how many.
+    fn read_triangles(&mut self, most: u64, triangles: &mut Vec<[u32; 3]>) -> Result<u64> {
+        const ROW: usize = 13;
+        let before = triangles.len();
+        let done = |triangles: &Vec<_>| (triangles.len() - before) as u64;
+        loop {
+            let encoding = self.encoding;
+            let shown = self.source.peek(ROW)?;
+            let left = usize::try_from(most - done(triangles)).unwrap_or(usize::MAX);
+            let mut used = 0;
+            let (mut highest, first) = (0, triangles.len());
+            for row in shown
+                .chunks_exact(ROW)
+                .take(left)
+                .take_while(|row| row[0] == 3)
+            {
+                let triangle = [1, 5, 9].map(|at| {
+                    let bytes = *row[at..].first_chunk().expect("a row has 13 bytes");
+                    match encoding {
+                        Encoding::BigEndian => u32::from_be_bytes(bytes),
+                        _ => u32::from_le_bytes(bytes),
+                    }
+                });
+                highest = triangle.into_iter().fold(highest, u32::max);
+                triangles.push(triangle);
+                used += ROW;
+            }
+            if used == 0 {
+                return Ok(done(triangles));
+            }
+            self.source.consume(used);
+            if u64::from(highest) >= self.vertices {
+                let is_wrong = |t: &[u32; 3]| t.iter().any(|&i| u64::from(i) >= self.vertices);
+                let at = first + triangles[first..].iter().position(is_wrong).unwrap_or(0);
+                let wrong = triangles[at].into_iter().fold(0, u32::max);
+                // Faces before this one may have been polygons: the number counts triangles.
+                return Err(self.out_of_range(at as u64, f64::from(wrong)));
+            }
+        }
+    }
+
+    /// Reads one row: its scalars, one a property (0 for a list), and the list that is wanted.
+    fn read_row(
+        &mut self,
+        element: &Element,
+        scalars: &mut Vec<f64>,
+        mut wanted: Option<(usize, &mut Vec<f64>)>,
+    ) -> Result<()> {
+        scalars.clear();
+        for (i, property) in element.properties.iter().enumerate() {
+            match property.kind {
+                Kind::Scalar(scalar) => {
+                    let value = self.read_scalar(scalar)?;
+                    scalars.push(value);
+                }
+                Kind::List { count, item } => {
+                    scalars.push(0.0);
+                    let length = self.read_scalar(count)?;
+                    let least = if self.encoding == Encoding::Ascii {
+                        2
+                    } else {
+                        item.size()
+                    };
+                    let remaining = self.source.remaining();
+                    // One more, as the last number of an ASCII file may end the file.
+                    if !(length >= 0.0
+                        && length * least as f64 <= remaining as f64 + 1.0
+                        && length.fract() == 0.0)
+                    {
+                        return Err(self.source.error(format!(
+                            "a list {:?} cannot have {length} items, as {remaining} bytes follow",
+                            property.name
+                        )));
+                    }
+                    let length = length as u64;
+                    match &mut wanted {
+                        Some((place, list)) if *place == i => {
+                            list.clear();
+                            for _ in 0..length {
+                                let value = self.read_scalar(item)?;
+                                list.push(value);
+                            }
+                        }
+                        _ if self.encoding == Encoding::Ascii => {
+                            for _ in 0..length {
+                                self.read_scalar(item)?;
+                            }
+                        }
+                        _ => self.source.skip(length * item.size() as u64)?,
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn read_scalar(&mut self, scalar: Scalar) -> Result<f64> {
+        if self.encoding == Encoding::Ascii {
+            return self.source.number();
+        }
+        let size = scalar.size();
+        let shown = self.source.peek(size)?;
+        if shown.len() < size {
+            return Err(self.source.error("the file ends too early"));
+        }
+        let value = scalar.decode(shown, self.encoding);
+        self.source.consume(size);
+        Ok(value)
+    }
+
+    fn skip(&mut self, element: &Element) -> Result<()> {
+        match element.stride() {
+            // Rows of nothing take no time, however many.
+            Some(0) => Ok(()),
+            Some(stride) if self.encoding != Encoding::Ascii => self
+                .source
+                .skip(element.count.saturating_mul(stride as u64)),
+            _ => {
+                let mut scalars = Vec::new();
+                (0..element.count).try_for_each(|_| self.read_row(element, &mut scalars, None))
+            }
+        }
+    }
+
+    fn ends_early(&self, element: &Element, left: u64) -> crate::error::Error {
+        let Element { name, count, .. } = element;
+        self.source.error(format!(
+            "the file ends early: {left} of {count} rows of element {name:?} are missing"
+        ))
+    }
+
+    fn out_of_range(&self, face: u64, index: f64) -> crate::error::Error {
+        let n = self.vertices;
+        let range = if n == 0 {
+            "has no vertices".to_owned()
+        } else {
+            format!("has vertices 0 to {}", n - 1)
+        };
+        self.source.error(format!(
+            "face {face}: vertex index {index} is out of range; the file {range}"
+        ))
+    }
+}
+
+/// Attributes that have no values yet.
+fn start(plans: Vec<Plan>, per: Per, rows: usize) -> Vec<Attribute> {
+    let attribute = |plan: Plan| {
+        let channels = plan.properties.len();
+        Attribute {
+            name: plan.name,
+            channels,
+            per,
+            values: Vec::with_capacity(rows * channels),
+        }
+    };
+    plans.into_iter().map(attribute).collect()
+}
+
+fn triple(columns: &[Column]) -> [Column; 3] {
+    columns.try_into().expect("three names were looked for")
+}

@@ -1,0 +1,224 @@
+//! Reading a mesh file: the table of formats, found by the file's extension, and what is common to all of
+//! them. A format is one file with a function from [`Input`] to [`Mesh`], and one row in [`FORMATS`].
+
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+use super::{Mesh, Repairs, gltf, obj, ply, serialized, stl};
+use crate::error::{Error, Location, Problem, Result};
+
+/// How to read a mesh file; the default is what Mitsuba does without properties.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ReadOptions {
+    /// Whether `v` of a texture coordinate becomes `1 − v`; `None` stands for the format's habit: true
+    /// for OBJ, false for all others.
+    pub flip_tex_coords: Option<bool>,
+    /// Which of the meshes of a `serialized` file, from 0.
+    pub shape_index: usize,
+}
+
+/// A mesh as read.
+#[derive(Clone, Debug)]
+pub struct Loaded {
+    /// The mesh, with finite triangles.
+    pub mesh: Mesh,
+    /// Triangles left out because a corner was not finite.
+    pub dropped_triangles: usize,
+    /// What was odd in the file and did not prevent reading it.
+    pub warnings: Vec<Problem>,
+}
+
+/// A mesh file format.
+#[derive(Clone, Copy, Debug)]
+pub struct Format {
+    /// File extensions, in lower case; the first is the name of the scene file's shape, where it has one.
+    pub extensions: &'static [&'static str],
+    read: fn(Input<'_>, &ReadOptions) -> Result<Decoded>,
+}
+
+/// All formats that [`read`] knows.
+pub const FORMATS: &[Format] = &[
+    Format {
+        extensions: &["ply"],
+        read: ply::read,
+    },
+    Format {
+        extensions: &["obj"],
+        read: obj::read,
+    },
+    Format {
+        extensions: &["serialized"],
+        read: serialized::read,
+    },
+    Format {
+        extensions: &["stl"],
+        read: stl::read,
+    },
+    Format {
+        extensions: &["gltf", "glb"],
+        read: gltf::read,
+    },
+];
+
+/// Reads the mesh in the file `path`, whose extension says the format.
+///
+/// # Errors
+/// Where the file cannot be opened, has an unknown extension or is malformed; the message says where.
+pub fn read(path: &Path, options: &ReadOptions) -> Result<Loaded> {
+    let format = format_of(path)?;
+    let Opened { file, length } = open(path)?;
+    let input = Input {
+        path,
+        length,
+        reader: &mut &file,
+    };
+    Ok((format.read)(input, options)?.finish(path))
+}
+
+/// A regular file.
+pub(super) struct Opened {
+    pub(super) file: File,
+    /// Its bytes.
+    pub(super) length: u64,
+}
+
+/// Opens `path`, which must be a regular file: others may never end.
+pub(super) fn open(path: &Path) -> Result<Opened> {
+    let file = File::open(path).map_err(|e| Error::system("open", path, &e))?;
+    let about = file
+        .metadata()
+        .map_err(|e| Error::system("read", path, &e))?;
+    if about.is_file() {
+        return Ok(Opened {
+            file,
+            length: about.len(),
+        });
+    }
+    let what = if about.is_dir() {
+        "a folder"
+    } else {
+        "no regular file"
+    };
+    let message = format!("a mesh file is wanted here, and this is {what}");
+    Err(Error::input(message).at(&Location::of_file(path)))
+}
+
+fn format_of(path: &Path) -> Result<&'static Format> {
+    let extension = path
+        .extension()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .to_lowercase();
+    let known = || FORMATS.iter().flat_map(|f| f.extensions.iter().copied());
+    FORMATS
+        .iter()
+        .find(|f| f.extensions.contains(&extension.as_str()))
+        .ok_or_else(|| {
+            let message = if extension.is_empty() {
+                "a mesh file needs an extension that says its format".to_owned()
+            } else {
+                format!("unknown mesh format {extension:?}")
+            };
+            let known: Vec<_> = known().collect();
+            Error::unsupported(message)
+                .at(&Location::of_file(path))
+                .suggest(&extension, known.iter().copied())
+                .help(format!("known are {}", known.join(", ")))
+        })
+}
+
+/// A file to decode, or bytes in its place.
+pub(super) struct Input<'a> {
+    /// For messages, and the folder of files that it names.
+    pub(super) path: &'a Path,
+    /// Bytes that `reader` will give.
+    pub(super) length: u64,
+    pub(super) reader: &'a mut dyn Read,
+}
+
+impl Input<'_> {
+    /// The whole file.
+    pub(super) fn bytes(self) -> Result<Vec<u8>> {
+        let mut bytes = Vec::with_capacity(usize::try_from(self.length).unwrap_or(0));
+        // A file that grows meanwhile is read as long as it was.
+        let read = self.reader.take(self.length).read_to_end(&mut bytes);
+        read.map_err(|e| Error::system("read", self.path, &e))?;
+        Ok(bytes)
+    }
+}
+
+/// What a format's reader returns: a mesh that is not checked yet.
+#[derive(Debug, Default)]
+pub(super) struct Decoded {
+    pub(super) mesh: Mesh,
+    /// What was odd, in words; the file's name is added to them.
+    pub(super) warnings: Vec<String>,
+}
+
+impl Decoded {
+    /// Checks the mesh, and says in the warnings what that mended.
+    pub(super) fn finish(mut self, path: &Path) -> Loaded {
+        let Repairs {
+            dropped_triangles,
+            mended_normals,
+            mended_uvs,
+        } = self.mesh.check();
+        for (count, what) in [
+            (
+                dropped_triangles,
+                "triangles dropped: a corner is not finite",
+            ),
+            (
+                mended_normals,
+                "vertex normals computed: the file has none of a direction",
+            ),
+            (
+                mended_uvs,
+                "texture coordinates set to 0: they are not finite",
+            ),
+        ] {
+            if count > 0 {
+                self.warnings.push(format!("{count} {what}"));
+            }
+        }
+        if self.mesh.triangles.is_empty() {
+            self.warnings.push("the mesh has no triangles".to_owned());
+        }
+        Loaded {
+            mesh: self.mesh,
+            dropped_triangles,
+            warnings: warnings(path, self.warnings),
+        }
+    }
+}
+
+/// `messages` as problems of the file `path`.
+pub(super) fn warnings(path: &Path, messages: Vec<String>) -> Vec<Problem> {
+    let place = Location::of_file(path);
+    let problems = messages.into_iter().map(|m| Error::input(m).at(&place));
+    problems.flat_map(|e| e.problems().to_vec()).collect()
+}
+
+#[cfg(test)]
+pub(super) mod testing {
+    //! Decoding from memory, as the tests of the formats do it.
+
+    use super::*;
+
+    /// Reads `bytes` as if they stood in a file called `name`.
+    pub(in crate::mesh) fn decode(
+        name: &str,
+        bytes: &[u8],
+        options: &ReadOptions,
+    ) -> Result<Loaded> {
+        let path = Path::new(name);
+        let mut reader = bytes;
+        let input = Input {
+            path,
+            length: bytes.len() as u64,
+            reader: &mut reader,
+        };
+        Ok((format_of(path)?.read)(input, options)?.finish(path))
+    }
+}

@@ -1,0 +1,188 @@
+//! A file read front to back through a small buffer, as lines, words or bytes, so that a mesh is decoded
+//! straight into its arrays and the file is never in memory as a whole. It knows how many bytes are left,
+//! which is what lengths in the file are held against, and the line it is on.
+
+use std::io::Read;
+use std::path::Path;
+
+use super::read::Input;
+use crate::error::{Error, Location, Result};
+
+/// Bytes asked for at a time: they stay in the second-level cache.
+const BUFFER: usize = 1 << 17;
+
+/// No line of a header and no number is longer.
+const LONGEST_LINE: usize = 1 << 16;
+const LONGEST_WORD: usize = 1 << 10;
+
+pub(super) struct Source<'a> {
+    path: &'a Path,
+    reader: &'a mut dyn Read,
+    /// Bytes that `reader` has yet to give.
+    ahead: u64,
+    buffer: Vec<u8>,
+    /// Bytes of `buffer` that are used up.
+    used: usize,
+    /// Line of the last word or line, from 1; 0 in binary data.
+    line: u32,
+}
+
+impl<'a> Source<'a> {
+    pub(super) fn new(input: Input<'a>) -> Self {
+        Self {
+            path: input.path,
+            reader: input.reader,
+            ahead: input.length,
+            buffer: Vec::new(),
+            used: 0,
+            line: 1,
+        }
+    }
+
+    /// Bytes from here to the end of the file.
+    pub(super) fn remaining(&self) -> u64 {
+        self.ahead + (self.buffer.len() - self.used) as u64
+    }
+
+    /// The bytes that follow, at least `wanted` of them unless the file ends.
+    pub(super) fn peek(&mut self, wanted: usize) -> Result<&[u8]> {
+        if self.buffer.len() - self.used < wanted && self.ahead > 0 {
+            self.buffer.drain(..self.used);
+            self.used = 0;
+            let room = (wanted.max(BUFFER) - self.buffer.len()) as u64;
+            let asked = room.min(self.ahead);
+            let got = (&mut *self.reader)
+                .take(asked)
+                .read_to_end(&mut self.buffer);
+            let got = got.map_err(|e| Error::system("read", self.path, &e))? as u64;
+            // A file that has shrunk meanwhile ends where it ends now.
+            self.ahead = if got < asked { 0 } else { self.ahead - got };
+        }
+        Ok(&self.buffer[self.used..])
+    }
+
+    /// Goes past `count` bytes that [`Source::peek`] has shown.
+    pub(super) fn consume(&mut self, count: usize) {
+        self.used += count;
+        debug_assert!(self.used <= self.buffer.len());
+    }
+
+    /// Goes past `count` bytes.
+    pub(super) fn skip(&mut self, mut count: u64) -> Result<()> {
+        while count > 0 {
+            let shown = self.peek(1)?.len();
+            if shown == 0 {
+                return Err(self.error("the file ends too early"));
+            }
+            let step = usize::try_from(count).unwrap_or(usize::MAX).min(shown);
+            self.consume(step);
+            count -= step as u64;
+        }
+        Ok(())
+    }
+
+    /// The next line, without its end.
+    pub(super) fn line(&mut self) -> Result<String> {
+        let shown = self.peek(LONGEST_LINE)?;
+        let end = shown.iter().take(LONGEST_LINE).position(|&b| b == b'\n');
+        let Some(end) = end else {
+            return Err(self.error("the file ends, or a line does not, before the header ends"));
+        };
+        let line = String::from_utf8_lossy(&shown[..end])
+            .trim_end_matches('\r')
+            .to_owned();
+        self.consume(end + 1);
+        self.line = self.line.saturating_add(1);
+        Ok(line)
+    }
+
+    /// The number that the next word says.
+    pub(super) fn number(&mut self) -> Result<f64> {
+        loop {
+            let shown = self.peek(1)?;
+            let blank = shown.iter().take_while(|b| b.is_ascii_whitespace());
+            let (blanks, lines) =
+                blank.fold((0, 0), |(n, l), &b| (n + 1, l + u32::from(b == b'\n')));
+            let more = blanks == shown.len() && blanks > 0;
+            self.consume(blanks);
+            self.line = self.line.saturating_add(lines);
+            if !more {
+                break;
+            }
+        }
+        let shown = self.peek(LONGEST_WORD)?;
+        let word = shown
+            .iter()
+            .take(LONGEST_WORD)
+            .take_while(|b| !b.is_ascii_whitespace());
+        let length = word.count();
+        let word = std::str::from_utf8(&shown[..length]).ok();
+        match word.and_then(|w| w.parse().ok()) {
+            Some(number) => {
+                self.consume(length);
+                Ok(number)
+            }
+            None if length == 0 => Err(self.error("the file ends where a number is wanted")),
+            None => {
+                let found = String::from_utf8_lossy(&shown[..length.min(32)]).into_owned();
+                Err(self.error(format!("a number is wanted, not {found:?}")))
+            }
+        }
+    }
+
+    /// From here on there are no lines.
+    pub(super) fn binary(&mut self) {
+        self.line = 0;
+    }
+
+    /// An error at the current line, or in the file.
+    pub(super) fn error(&self, message: impl Into<String>) -> Error {
+        Error::input(message).at(&Location::of_line(self.path, self.line))
+    }
+
+    /// An error at the line that was read last.
+    pub(super) fn error_at_last_line(&self, message: impl Into<String>) -> Error {
+        Error::input(message).at(&Location::of_line(self.path, self.line.saturating_sub(1)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_and_bytes_are_the_same_however_the_buffer_cuts_them() {
+        let count = 50_000;
+        let text: String = (0..count).map(|i| format!("{i}.5 \r\n")).collect();
+        let mut reader = text.as_bytes();
+        let path = Path::new("numbers");
+        let length = text.len() as u64;
+        let mut source = Source::new(Input {
+            path,
+            length,
+            reader: &mut reader,
+        });
+        for i in 0..count {
+            assert_eq!(source.number().unwrap(), f64::from(i) + 0.5);
+        }
+        let end = source.number().unwrap_err().to_string();
+        assert!(end.starts_with("numbers:50001: the file ends"), "{end}");
+        assert_eq!(source.remaining(), 0);
+    }
+
+    #[test]
+    fn a_word_that_is_no_number_is_shown_with_its_line() {
+        let mut reader = &b"1 2\n3 four"[..];
+        let input = Input {
+            path: Path::new("numbers"),
+            length: 10,
+            reader: &mut reader,
+        };
+        let mut source = Source::new(input);
+        for _ in 0..3 {
+            source.number().unwrap();
+        }
+        let error = source.number().unwrap_err().to_string();
+        assert_eq!(error, "numbers:2: a number is wanted, not \"four\"");
+    }
+}

@@ -1,0 +1,124 @@
+//! STL, binary and ASCII (3D Systems, 1989): triangles without shared vertices. Corners at exactly the same
+//! place become one vertex, so that normals can be smooth; the file's face normals are not used, as the
+//! winding says the same. A binary file is one whose length is 84 + 50 n, with n in its header, whatever
+//! text it begins with.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use glam::Vec3;
+
+use super::Mesh;
+use super::read::{Decoded, Input, ReadOptions};
+use crate::error::{Error, Location, Result};
+
+/// A comment of 80 bytes and the count of triangles.
+const HEADER: usize = 84;
+/// A normal and three corners of f32, and 16 bits without a meaning.
+const ROW: usize = 50;
+
+pub(super) fn read(input: Input<'_>, _options: &ReadOptions) -> Result<Decoded> {
+    let path = input.path;
+    let bytes = input.bytes()?;
+    let count = bytes.get(HEADER - 4..).and_then(|b| b.first_chunk());
+    let count = count.map(|&b| u32::from_le_bytes(b) as u64);
+    let promised = count.map(|n| HEADER as u64 + n * ROW as u64);
+    let mut builder = Builder::default();
+    let trimmed = bytes.trim_ascii_start();
+    if promised != Some(bytes.len() as u64) && trimmed.starts_with(b"solid") {
+        builder.read_text(&bytes, path)?;
+    } else {
+        let (Some(count), Some(promised)) = (count, promised) else {
+            return Err(
+                Error::input("the file is no STL: it is too short for a binary one")
+                    .at(&Location::of_file(path))
+                    .help("an ASCII file begins with \"solid\""),
+            );
+        };
+        if promised > bytes.len() as u64 {
+            let message = format!(
+                "the file is cut short, or no STL: {count} triangles are promised, {promised} bytes, and it has {}",
+                bytes.len()
+            );
+            return Err(Error::input(message).at(&Location::of_file(path)));
+        }
+        builder.read_binary(&bytes[HEADER..promised as usize]);
+    }
+    Ok(Decoded {
+        mesh: builder.mesh,
+        warnings: Vec::new(),
+    })
+}
+
+#[derive(Default)]
+struct Builder {
+    mesh: Mesh,
+    /// The vertex at a place.
+    vertices: HashMap<[u32; 3], u32>,
+}
+
+impl Builder {
+    fn read_binary(&mut self, rows: &[u8]) {
+        self.mesh.triangles.reserve_exact(rows.len() / ROW);
+        for row in rows.chunks_exact(ROW) {
+            let number = |at: usize| {
+                f32::from_le_bytes(*row[at..].first_chunk().expect("a row has 50 bytes"))
+            };
+            let corner = |at: usize| Vec3::new(number(at), number(at + 4), number(at + 8));
+            self.push([corner(12), corner(24), corner(36)]);
+        }
+    }
+
+    /// `vertex x y z`, three times a facet; the words between say nothing more.
+    fn read_text(&mut self, bytes: &[u8], path: &Path) -> Result<()> {
+        let mut corners = Vec::new();
+        for (line, number) in bytes.split(|&b| b == b'\n').zip(1..) {
+            let wrong = |message: &str| Error::input(message).at(&Location::of_line(path, number));
+            let mut words = line
+                .split(u8::is_ascii_whitespace)
+                .filter(|w| !w.is_empty());
+            match words.next() {
+                Some(b"vertex") => {
+                    let numbers = words.map(|w| std::str::from_utf8(w).ok()?.parse().ok());
+                    let numbers: Option<Vec<f32>> = numbers.take(4).collect();
+                    match numbers.as_deref() {
+                        Some(&[x, y, z]) => corners.push(Vec3::new(x, y, z)),
+                        _ => return Err(wrong("three numbers are wanted after \"vertex\"")),
+                    }
+                }
+                Some(b"endloop" | b"endfacet" | b"outer" | b"facet") => {
+                    match corners[..] {
+                        [] => {}
+                        [a, b, c] => self.push([a, b, c]),
+                        _ => return Err(wrong("a facet has three vertices, and this one has not")),
+                    }
+                    corners.clear();
+                }
+                None | Some(b"solid" | b"endsolid") => {}
+                Some(word) => {
+                    let word = String::from_utf8_lossy(&word[..word.len().min(32)]);
+                    return Err(wrong(&format!("unknown word {word:?}")));
+                }
+            }
+        }
+        if corners.is_empty() {
+            Ok(())
+        } else {
+            Err(Error::input("the file ends within a facet").at(&Location::of_file(path)))
+        }
+    }
+
+    fn push(&mut self, corners: [Vec3; 3]) {
+        let triangle = corners.map(|corner| {
+            // −0 and 0 are one place.
+            let key = (corner + 0.0).to_array().map(f32::to_bits);
+            *self.vertices.entry(key).or_insert_with(|| {
+                self.mesh.positions.push(corner);
+                // A file of 2³² triangles has a count that wraps, and ASCII ones of this size (half a
+                // terabyte) do not fit into memory.
+                (self.mesh.positions.len() - 1) as u32
+            })
+        });
+        self.mesh.triangles.push(triangle);
+    }
+}
