@@ -166,8 +166,10 @@ impl<'o> Reader<'o> {
             self.lost_ids = LostIds::Any;
         }
         if let LostIds::Some(ids) = &mut self.lost_ids {
-            let lost = child.descendants().filter_map(|n| n.attribute("id"));
-            ids.extend(lost.map(str::to_owned));
+            for node in child.descendants() {
+                let names = ["id", "as"].map(|attribute| node.attribute(attribute));
+                ids.extend(names.into_iter().flatten().map(str::to_owned));
+            }
         }
     }
 
