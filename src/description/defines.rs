@@ -6,7 +6,8 @@ use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Bound;
 
-use crate::error::{Error, Problems, Result};
+use super::report::{CANDIDATES, Report};
+use crate::error::{Error, Result};
 
 /// Bytes that all substitutions of a scene together may write.
 const MAX_SUBSTITUTED: usize = 64 << 20;
@@ -93,17 +94,20 @@ impl Defines {
     }
 
     /// Notes the command line's parameters that nothing used.
-    pub(super) fn report_unused(&self, problems: &mut Problems) {
-        for (name, define) in &self.values {
-            if define.given && !define.used {
-                let mistaken = self.known.iter().map(String::as_str).filter(|&n| n != name);
-                problems.push(
-                    Error::input(format!(
-                        "the scene has no parameter ${name} to be set by -D"
-                    ))
-                    .suggest(name, mistaken),
-                );
-            }
+    pub(super) fn report_unused(&self, report: &mut Report) {
+        let unused = |define: &&Define| define.given && !define.used;
+        for (name, _) in self.values.iter().filter(|(_, define)| unused(define)) {
+            report.push(if self.known.contains(name) {
+                Error::input(format!(
+                    "the scene never uses its parameter ${name}, set by -D"
+                ))
+            } else {
+                let known = self.known.iter().take(CANDIDATES).map(String::as_str);
+                Error::input(format!(
+                    "the scene has no parameter ${name} to be set by -D"
+                ))
+                .suggest(name, known)
+            });
         }
     }
 
@@ -132,7 +136,10 @@ impl Defines {
             return Error::input("no name after $; write \\$ for a dollar sign");
         }
         Error::input(format!("undefined parameter ${name}"))
-            .suggest(name, self.values.keys().map(String::as_str))
+            .suggest(
+                name,
+                self.values.keys().take(CANDIDATES).map(String::as_str),
+            )
             .help("give it by -D or by a <default> above this line")
     }
 }
@@ -186,9 +193,9 @@ mod tests {
         let mut d = defines(&["spp", "ssp"]);
         d.set_default("spp", "1");
         assert_eq!(d.substitute("$spp").unwrap(), "<spp>");
-        let mut problems = Problems::default();
-        d.report_unused(&mut problems);
-        let message = problems.finish().unwrap_err().to_string();
+        let mut report = Report::default();
+        d.report_unused(&mut report);
+        let message = report.finish().unwrap_err().to_string();
         assert!(message.contains("no parameter $ssp"), "{message}");
         assert!(message.contains("did you mean \"spp\"?"), "{message}");
     }

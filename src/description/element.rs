@@ -98,8 +98,10 @@ impl<'f> Element<'f> {
 
     /// A required attribute that says something.
     pub(super) fn filled(&self, name: &str) -> Result<&str> {
-        match self.required(name)?.trim() {
-            "" => Err(self.attribute_error(name, format!("the attribute {name:?} is empty"))),
+        match self.required(name)? {
+            text if text.trim().is_empty() => {
+                Err(self.attribute_error(name, format!("the attribute {name:?} is empty")))
+            }
             text => Ok(text),
         }
     }

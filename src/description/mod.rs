@@ -8,6 +8,7 @@ pub mod properties;
 mod defines;
 mod element;
 mod reader;
+mod report;
 mod resolve;
 mod transform;
 mod upgrade;
@@ -113,7 +114,7 @@ impl fmt::Display for Kind {
 }
 
 /// What a property holds. Numbers are finite.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Value {
     /// `<boolean>`
     Boolean(bool),

@@ -39,8 +39,10 @@ impl<'a> Properties<'a> {
         self.node.kind
     }
 
-    /// The plugin's name: the tag's `type`, and `"scene"` for the root.
+    /// The plugin's name: the tag's `type`, and `"scene"` for the root. Whoever asks is taken to build the plugin, even
+    /// where that has no properties.
     pub fn plugin(&self) -> &'a str {
+        self.node.visited.store(true, Ordering::Relaxed);
         &self.node.plugin
     }
 
@@ -121,6 +123,9 @@ impl<'a> Properties<'a> {
         };
         let scope = self.find(name).map_or(0, |property| property.scope);
         match self.description.scopes.find(scope, file) {
+            Ok(path) if path.is_dir() => {
+                Err(self.error(name, format!("{} is a folder", path.display())))
+            }
             Ok(path) => Ok(Some(path)),
             Err(error) => Err(self.at(name, error)),
         }

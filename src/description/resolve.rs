@@ -5,8 +5,9 @@
 use std::path::{Path, PathBuf};
 
 use super::reader::{MAX_DEPTH, Reader};
+use super::report::{CANDIDATES, Report};
 use super::{Node, NodeId, Value};
-use crate::error::{Error, Problems};
+use crate::error::Error;
 
 /// A `<ref>` whose target is not known yet.
 #[derive(Debug)]
@@ -18,10 +19,11 @@ pub(super) struct Reference {
 }
 
 /// Gives every reference its node and notes those that have none.
-pub(super) fn references(reader: &mut Reader<'_>, problems: &mut Problems) {
-    /// More candidates than this are not worth the time that comparing takes.
-    const CANDIDATES: usize = 10_000;
+pub(super) fn references(reader: &mut Reader<'_>, report: &mut Report) {
     for reference in &reader.references {
+        if report.is_full() {
+            return;
+        }
         let Reference {
             node,
             property,
@@ -31,7 +33,7 @@ pub(super) fn references(reader: &mut Reader<'_>, problems: &mut Problems) {
         match reader.ids.get(target) {
             Some(&(id, _)) => property.value = Value::Object(id),
             None if reader.lost_ids.contains(target) => {}
-            None => problems.push(
+            None => report.push(
                 Error::input(format!("nothing has the id {target:?}"))
                     .at(&property.location)
                     .suggest(
@@ -44,7 +46,7 @@ pub(super) fn references(reader: &mut Reader<'_>, problems: &mut Problems) {
 }
 
 /// Notes properties that a node has twice.
-pub(super) fn duplicates(nodes: &[Node], problems: &mut Problems) {
+pub(super) fn duplicates(nodes: &[Node], report: &mut Report) {
     for node in nodes {
         let mut named: Vec<_> = node
             .properties
@@ -54,7 +56,7 @@ pub(super) fn duplicates(nodes: &[Node], problems: &mut Problems) {
         // Stable, so that of two of the same name the one further up comes first.
         named.sort_by_key(|p| &p.name);
         for pair in named.windows(2).filter(|w| w[0].name == w[1].name) {
-            problems.push(
+            report.push(
                 Error::input(format!(
                     "{} {:?} has a second property {:?}",
                     node.kind, node.plugin, pair[1].name
@@ -68,7 +70,7 @@ pub(super) fn duplicates(nodes: &[Node], problems: &mut Problems) {
 
 /// Notes nodes that contain themselves and nodes nested more deeply than [`MAX_DEPTH`]; what is built from the nodes
 /// may then safely recurse.
-pub(super) fn nesting(nodes: &[Node], problems: &mut Problems) {
+pub(super) fn nesting(nodes: &[Node], report: &mut Report) {
     #[derive(Clone, Copy, PartialEq)]
     enum State {
         New,
@@ -107,7 +109,7 @@ pub(super) fn nesting(nodes: &[Node], problems: &mut Problems) {
                     states[child] = State::Open;
                     path.push((child, 0, 0));
                 }
-                State::Open => problems.push(
+                State::Open => report.push(
                     Error::input(format!("this {} contains itself", describe(&nodes[child])))
                         .at(&property.location)
                         .related(&nodes[child].location, "it begins"),
@@ -116,7 +118,7 @@ pub(super) fn nesting(nodes: &[Node], problems: &mut Problems) {
             }
         }
         if matches!(states[start], State::Closed(below) if below > MAX_DEPTH) {
-            problems.push(
+            report.push(
                 Error::input(format!(
                     "nested more than {MAX_DEPTH} levels deep through references"
                 ))

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 
 use super::element::Element;
-use super::{Spectrum, Value, xml};
+use super::{Spectrum, Value};
 use crate::error::{Error, Location, Result};
 
 /// The tags that hold one value.
@@ -14,11 +14,11 @@ pub(super) const TAGS: [&str; 8] = [
     "boolean", "integer", "float", "string", "point", "vector", "rgb", "spectrum",
 ];
 
-/// The value of the tag `element`, one of [`TAGS`]; `find_file` tells where a spectrum's file is.
+/// The value of the tag `element`, one of [`TAGS`]; `read_file` finds and reads the file of a spectrum.
 pub(super) fn value(
     element: &Element<'_>,
     strict: bool,
-    find_file: impl Fn(&str) -> Result<PathBuf>,
+    read_file: impl FnOnce(&str) -> Result<(String, PathBuf)>,
 ) -> Result<Value> {
     let wrong = |e: Error| e.at(element.attribute_location("value"));
     match element.tag {
@@ -28,7 +28,7 @@ pub(super) fn value(
         }
         "spectrum" => {
             element.only(&["name", "value", "filename"])?;
-            return Ok(Value::Spectrum(spectrum(element, find_file)?));
+            return Ok(Value::Spectrum(spectrum(element, read_file)?));
         }
         _ => element.only(&["name", "value"])?,
     }
@@ -151,19 +151,16 @@ fn rgb(text: &str, strict: bool) -> Result<DVec3> {
 
 fn spectrum(
     element: &Element<'_>,
-    find_file: impl Fn(&str) -> Result<PathBuf>,
+    read_file: impl FnOnce(&str) -> Result<(String, PathBuf)>,
 ) -> Result<Spectrum> {
     match (element.optional("value"), element.optional("filename")) {
         (Some(text), None) => {
             listed_spectrum(text).map_err(|e| e.at(element.attribute_location("value")))
         }
         (None, Some(_)) => {
-            let path = find_file(element.filled("filename")?)
+            let (text, path) = read_file(element.filled("filename")?)
                 .map_err(|e| e.at(element.attribute_location("filename")))?;
-            spectrum_file(
-                &xml::read_text(&path).map_err(|e| e.at(&element.location))?,
-                &path,
-            )
+            spectrum_file(&text, &path)
         }
         _ => {
             Err(element.error("<spectrum> takes either \"value\" or \"filename\" (or a \"type\")"))

@@ -21,11 +21,12 @@ const MAX_ATTRIBUTES: usize = 1000;
 /// The text of a regular file of at most [`MAX_BYTES`].
 pub(super) fn read_text(path: &Path) -> Result<String> {
     let refused = |cause| Error::system("read", path, &cause);
-    let file = File::open(path).map_err(refused)?;
-    if !file.metadata().map_err(refused)?.is_file() {
+    // Asked before it is opened, as opening a pipe may wait for ever.
+    if !std::fs::metadata(path).map_err(refused)?.is_file() {
         return Err(Error::input("not a regular file").at(&Location::of_file(path)));
     }
     let mut bytes = Vec::new();
+    let file = File::open(path).map_err(refused)?;
     file.take(MAX_BYTES + 1)
         .read_to_end(&mut bytes)
         .map_err(refused)?;
@@ -79,8 +80,11 @@ pub(super) fn parse<'t>(text: &'t str, lines: &Lines<'t>) -> Result<Document<'t>
 }
 
 fn refuse_greedy_tags(text: &str, lines: &Lines<'_>) -> Result<()> {
-    let mut start = 0;
+    let mut next = 0;
     for piece in text.split('<') {
+        // Where its `<` stands, which the first piece lacks.
+        let start = usize::saturating_sub(next, 1);
+        next += piece.len() + 1;
         // A tag with its attributes has no `<` inside, so that each piece holds at most one.
         if !piece.starts_with(['!', '?', '/']) {
             if piece
@@ -101,7 +105,6 @@ fn refuse_greedy_tags(text: &str, lines: &Lines<'_>) -> Result<()> {
                 );
             }
         }
-        start += piece.len() + 1;
     }
     Ok(())
 }

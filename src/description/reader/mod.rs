@@ -2,6 +2,8 @@
 //! gathered and the walk goes on with the next tag; depth, elements and bytes are bounded over all files
 //! together, so that no arrangement of includes can run away.
 
+mod structure;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -9,20 +11,17 @@ use std::sync::atomic::AtomicBool;
 
 use super::defines::Defines;
 use super::element::{Element, File};
+use super::report::Report;
 use super::resolve::{self, Reference, Scopes};
 use super::upgrade::{self, Version};
 use super::xml::{self, Lines};
 use super::{Description, Kind, Node, NodeId, Options, Property, Value, transform, values};
-use crate::error::{Error, Kind as ErrorKind, Location, Problem, Problems, Result};
+use crate::error::{Error, Kind as ErrorKind, Location, Problem, Result};
 
 /// Levels of nested plugins and includes.
 pub(super) const MAX_DEPTH: usize = 64;
 /// Elements in all files together.
 const MAX_ELEMENTS: usize = 4_000_000;
-/// Includes carried out in all files together.
-const MAX_INCLUDES: usize = 10_000;
-/// Problems that a user can make use of; the walk stops there.
-const MAX_PROBLEMS: usize = 100;
 
 /// Tags that are neither plugins nor plain values.
 const STRUCTURE: [&str; 7] = [
@@ -44,13 +43,13 @@ pub(super) struct Reader<'o> {
     pub(super) lost_ids: LostIds,
     scopes: Scopes,
     defines: Defines,
-    problems: Problems,
-    problem_count: usize,
+    report: Report,
     warnings: Vec<Problem>,
     /// Nodes of files that are older than the current names.
     old_nodes: Vec<NodeId>,
     elements: usize,
     includes: usize,
+    /// Read from files beside the scene's own.
     bytes: u64,
     /// The files being read, outermost first, each with the place that asked for it.
     open_files: Vec<(PathBuf, Location)>,
@@ -66,8 +65,7 @@ impl<'o> Reader<'o> {
             lost_ids: LostIds::Some(BTreeSet::new()),
             scopes: Scopes::new(),
             defines: Defines::new(&options.defines),
-            problems: Problems::default(),
-            problem_count: 0,
+            report: Report::default(),
             warnings: Vec::new(),
             old_nodes: Vec::new(),
             elements: 0,
@@ -80,23 +78,24 @@ impl<'o> Reader<'o> {
     /// Reads the whole scene and resolves it.
     pub(super) fn scene(mut self, text: &str, path: &Path) -> Result<Description> {
         self.open_files
-            .push((canonical(path), Location::of_file(path)));
+            .push((structure::canonical(path), Location::of_file(path)));
         let scope = self.scopes.open(path, Scopes::WORKING_DIRECTORY);
         self.document(text, path, scope, None)?;
-        let mut problems = std::mem::take(&mut self.problems);
-        if self.problem_count < MAX_PROBLEMS {
-            self.defines.report_unused(&mut problems);
-        }
-        resolve::references(&mut self, &mut problems);
+        let mut report = std::mem::take(&mut self.report);
+        self.defines.report_unused(&mut report);
+        resolve::references(&mut self, &mut report);
         for id in std::mem::take(&mut self.old_nodes) {
-            problems.take(upgrade::texture_placement(&mut self.nodes[id.index()]));
+            let node = &mut self.nodes[id.index()];
+            if let Err(error) = upgrade::texture_placement(node) {
+                report.push(error);
+            }
         }
-        resolve::duplicates(&self.nodes, &mut problems);
+        resolve::duplicates(&self.nodes, &mut report);
         // What an unresolved reference stands for is unknown, so there may be no loop to speak of.
-        if problems.is_empty() {
-            resolve::nesting(&self.nodes, &mut problems);
+        if report.is_empty() {
+            resolve::nesting(&self.nodes, &mut report);
         }
-        problems.finish()?;
+        report.finish()?;
         Ok(Description {
             nodes: self.nodes,
             scopes: self.scopes,
@@ -113,14 +112,6 @@ impl<'o> Reader<'o> {
         include: Option<Place<'_>>,
     ) -> Result<()> {
         let lines = Lines::new(text, path);
-        self.bytes += text.len() as u64;
-        if self.bytes > xml::MAX_BYTES {
-            let limit = xml::MAX_BYTES >> 20;
-            return Err(
-                Error::input(format!("the scene's files hold more than {limit} MiB"))
-                    .at(&lines.at(0)),
-            );
-        }
         let tree = xml::parse(text, &lines)?;
         let root = Element::open(tree.root_element(), &lines, &mut self.defines)?;
         let version = root
@@ -159,35 +150,26 @@ impl<'o> Reader<'o> {
 
     fn children(&mut self, element: &Element<'_>, file: &File<'_>, parent: NodeId, depth: usize) {
         for child in element.children() {
-            if self.problem_count >= MAX_PROBLEMS {
+            if self.report.is_full() {
                 return;
             }
             if let Err(error) = self.child(child, file, parent, depth) {
-                self.note(error, child, file);
+                self.report.push(error);
+                self.lose_ids(child);
             }
         }
     }
 
-    /// Notes that `child` could not be read, and which ids are unknown for that reason.
-    fn note(&mut self, error: Error, child: roxmltree::Node<'_, '_>, file: &File<'_>) {
-        self.problem_count += error.problems().len();
-        self.problems.push(error);
-        if self.problem_count >= MAX_PROBLEMS {
-            let message = "too many problems: the rest of the scene was not read";
-            self.problems
-                .push(Error::input(message).at(&file.lines.at(child.range().start)));
-            self.lost_ids = LostIds::Any;
-        }
-        if child.has_tag_name("include") {
+    /// Notes which ids are unknown because `child` could not be read.
+    fn lose_ids(&mut self, child: roxmltree::Node<'_, '_>) {
+        if child.has_tag_name("include") || self.report.is_full() {
             self.lost_ids = LostIds::Any;
         }
         if let LostIds::Some(ids) = &mut self.lost_ids {
-            ids.extend(
-                child
-                    .descendants()
-                    .filter_map(|n| n.attribute("id"))
-                    .map(str::to_owned),
-            );
+            for node in child.descendants() {
+                let names = ["id", "as"].map(|attribute| node.attribute(attribute));
+                ids.extend(names.into_iter().flatten().map(str::to_owned));
+            }
         }
     }
 
@@ -200,9 +182,11 @@ impl<'o> Reader<'o> {
     ) -> Result<()> {
         self.elements += 1;
         if self.elements > MAX_ELEMENTS {
-            self.problem_count = MAX_PROBLEMS; // There is no use in going on.
-            return Err(Error::input(format!("more than {MAX_ELEMENTS} elements"))
-                .at(&file.lines.at(node.range().start)));
+            self.report.close(
+                Error::input(format!("more than {MAX_ELEMENTS} elements"))
+                    .at(&file.lines.at(node.range().start)),
+            );
+            return Ok(());
         }
         let element = Element::open(node, &file.lines, &mut self.defines)?;
         let place = Place {
@@ -330,7 +314,8 @@ impl<'o> Reader<'o> {
     fn value(&mut self, element: &Element<'_>, file: &File<'_>, parent: NodeId) -> Result<()> {
         let name = element.filled("name")?;
         let value = values::value(element, self.options.strict, |name| {
-            self.scopes.find(file.scope, name)
+            let path = self.scopes.find(file.scope, name)?;
+            Ok((self.text(&path)?, path))
         })?;
         element.no_children(&file.lines)?;
         self.property(file, parent, name, value, &element.location);
@@ -362,79 +347,6 @@ impl<'o> Reader<'o> {
             target,
         });
         Ok(())
-    }
-
-    fn include(&mut self, element: &Element<'_>, file: &File<'_>, place: Place<'_>) -> Result<()> {
-        element.only(&["filename", "name"])?;
-        element.no_children(&file.lines)?;
-        if place.depth >= MAX_DEPTH {
-            return Err(element.error(format!("nested more than {MAX_DEPTH} levels deep")));
-        }
-        self.includes += 1;
-        if self.includes > MAX_INCLUDES {
-            self.problem_count = MAX_PROBLEMS; // There is no use in going on.
-            return Err(element.error(format!("more than {MAX_INCLUDES} includes")));
-        }
-        let path = self
-            .scopes
-            .find(file.scope, element.filled("filename")?)
-            .map_err(|e| e.at(element.attribute_location("filename")))?;
-        let file_id = canonical(&path);
-        if let Some((_, first)) = self.open_files.iter().find(|(open, _)| *open == file_id) {
-            return Err(element
-                .error(format!("{} includes itself", path.display()))
-                .related(first, "it was opened"));
-        }
-        let text = xml::read_text(&path).map_err(|e| e.at(&element.location))?;
-        self.open_files.push((file_id, element.location.clone()));
-        let scope = self.scopes.open(&path, file.scope);
-        let place = Place {
-            depth: place.depth + 1,
-            name: element.optional("name"),
-            ..place
-        };
-        let result = self.document(&text, &path, scope, Some(place));
-        self.open_files.pop();
-        result
-    }
-
-    fn default(&mut self, element: &Element<'_>, file: &File<'_>) -> Result<()> {
-        element.only(&["name", "value"])?;
-        element.no_children(&file.lines)?;
-        let name = element.filled("name")?;
-        self.defines.set_default(name, element.required("value")?);
-        Ok(())
-    }
-
-    fn path(&mut self, element: &Element<'_>, file: &File<'_>, parent: NodeId) -> Result<()> {
-        element.only(&["value"])?;
-        element.no_children(&file.lines)?;
-        if parent != NodeId::ROOT {
-            return Err(element.error("<path> stands directly inside <scene>"));
-        }
-        let folder = self
-            .scopes
-            .find(file.scope, element.filled("value")?)
-            .map_err(|e| e.at(element.attribute_location("value")))?;
-        if !folder.is_dir() {
-            return Err(
-                element.attribute_error("value", format!("{} is not a folder", folder.display()))
-            );
-        }
-        self.scopes.add(file.scope, folder);
-        Ok(())
-    }
-
-    fn alias(&mut self, element: &Element<'_>, file: &File<'_>) -> Result<()> {
-        element.only(&["id", "as"])?;
-        element.no_children(&file.lines)?;
-        let (id, alias) = (element.filled("id")?, element.filled("as")?);
-        let Some(&(node, _)) = self.ids.get(id) else {
-            return Err(element
-                .attribute_error("id", format!("nothing above has the id {id:?}"))
-                .suggest(id, self.ids.keys().map(String::as_str)));
-        };
-        self.register(alias, node, element, "as")
     }
 
     fn warn_of_upgrade(&mut self, root: &Element<'_>) {
@@ -480,9 +392,4 @@ struct Place<'n> {
     depth: usize,
     /// Its property's name, where an `<include>` gives one.
     name: Option<&'n str>,
-}
-
-/// The same for every way to write the path of a file.
-fn canonical(path: &Path) -> PathBuf {
-    path.canonicalize().unwrap_or_else(|_| path.to_path_buf())
 }
