@@ -2,6 +2,7 @@
 //! (openexr.com, "OpenEXR File Layout"). The crate `exr` codes the blocks of pixels; which blocks, where
 //! they go and how much memory they may take is decided here.
 
+mod dwa;
 mod read;
 mod write;
 

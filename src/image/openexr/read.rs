@@ -12,7 +12,7 @@ use ::exr::meta::header::Header;
 use ::exr::prelude::{AttributeValue, Compression, SampleType, Vec2, f16};
 use rayon::prelude::*;
 
-use super::{WORLD_TO_CAMERA, WORLD_TO_NDC, batch_length};
+use super::{WORLD_TO_CAMERA, WORLD_TO_NDC, batch_length, dwa};
 use crate::error::{Error, Result};
 use crate::image::{Encoding, Image, Limits, Picture};
 
@@ -46,6 +46,9 @@ pub(crate) fn decode(bytes: &[u8], limits: &Limits) -> Result<Picture> {
         if compressed.is_empty() {
             break;
         }
+        for chunk in &compressed {
+            dwa::check(chunk, &headers)?;
+        }
         let blocks: Vec<UncompressedBlock> = compressed
             .into_par_iter()
             .map(|chunk| UncompressedBlock::decompress_chunk(chunk, &meta, false))
@@ -69,7 +72,7 @@ pub(crate) fn decode(bytes: &[u8], limits: &Limits) -> Result<Picture> {
     })
 }
 
-fn refused(error: ::exr::error::Error) -> Error {
+pub(super) fn refused(error: ::exr::error::Error) -> Error {
     match error {
         ::exr::error::Error::NotSupported(what) => Error::unsupported(what.into_owned()),
         ::exr::error::Error::Io(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => {

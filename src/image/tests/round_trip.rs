@@ -139,6 +139,56 @@ fn exr_refuses_names_that_would_break_the_file() {
 }
 
 #[test]
+fn exr_of_other_programs_is_read_whatever_its_types_and_compression() {
+    for (compression, bytes) in foreign_exrs() {
+        let image = try_exr(&bytes).unwrap_or_else(|e| panic!("{compression}: {e}"));
+        assert_eq!(image.channels(), ["R", "G", "Z", "id"]);
+        for (x, y) in [(0, 0), (39, 0), (17, 33), (39, 69)] {
+            let i = y * 40 + x;
+            let ramp = 1.0 + (x + y) as f32 / 128.0;
+            let pixel = image.pixel(x, y);
+            // The lossy ones (PXR24, B44, DWA) keep two digits.
+            assert!((pixel[0] - ramp).abs() < 0.01, "{compression}: {pixel:?}");
+            assert!((pixel[1] - 1.0).abs() < 1e-3, "{compression}: {pixel:?}");
+            assert!((pixel[2] - ramp).abs() < 0.01, "{compression}: {pixel:?}");
+            assert_eq!(pixel[3], i as f32, "{compression}");
+        }
+    }
+}
+
+#[test]
+fn exr_parts_become_layers_of_one_image() {
+    use ::exr::prelude::*;
+    let part = |name: &str, size: (usize, usize), value: f32| {
+        let samples = FlatSamples::F32(vec![value; size.0 * size.1]);
+        let channels = AnyChannels::sort([AnyChannel::new("Y", samples)].into_iter().collect());
+        Layer::new(
+            size,
+            LayerAttributes::named(name),
+            Encoding::UNCOMPRESSED,
+            channels,
+        )
+    };
+    let file = |parts: [Layer<AnyChannels<FlatSamples>>; 2]| {
+        let attributes = ImageAttributes::with_size((4, 3));
+        let mut file = std::io::Cursor::new(Vec::new());
+        let layers: Layers<AnyChannels<FlatSamples>> = parts.into_iter().collect();
+        let image = ::exr::image::Image::from_layers(attributes, layers);
+        image.write().to_buffered(&mut file).unwrap();
+        file.into_inner()
+    };
+    let image = try_exr(&file([part("near", (4, 3), 1.0), part("far", (4, 3), 2.0)])).unwrap();
+    assert_eq!(image.channels(), ["near.Y", "far.Y"]);
+    assert_eq!(image.pixel(3, 2), [1.0, 2.0]);
+    let unequal = try_exr(&file([part("near", (4, 3), 1.0), part("far", (4, 2), 2.0)]));
+    assert_eq!(unequal.unwrap_err().problems()[0].kind, Kind::Unsupported);
+}
+
+fn try_exr(bytes: &[u8]) -> Result<Image> {
+    openexr::decode(bytes, &Limits::default()).map(|picture| picture.image)
+}
+
+#[test]
 fn hdr_keeps_colours_to_a_hundredth_of_the_brightest() {
     for width in [1, 7, 8, 200] {
         let mut image = sample(width, 3, &["R", "G", "B"]);
