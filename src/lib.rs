@@ -29,4 +29,3 @@ pub mod scene;
 
 pub mod integrator;
 
-pub mod render;

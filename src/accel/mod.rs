@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 use crate::interaction::{Hit, Interaction, Ray};
 use crate::math::Transform;
-use crate::shape::{Bounds, Geometry, Surface};
+use crate::shape::{Bounds, Geometry};
 
 use boxes::RayBoxes;
 use group::{Group, Item};

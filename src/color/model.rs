@@ -20,7 +20,7 @@ pub enum Color {
 }
 
 /// What a colour stands for, which decides how it is bounded and upsampled.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Role {
     /// A fraction in [0, 1]: reflectance, transmittance, opacity.
     Reflectance,

@@ -7,6 +7,7 @@ pub mod properties;
 
 mod defines;
 mod element;
+mod overrides;
 mod reader;
 mod report;
 mod resolve;

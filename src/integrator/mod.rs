@@ -99,3 +99,16 @@ impl<C: ColorModel> Default for Integrator<C> {
 
 /// The first dimension that an integrator may use; those before are the camera's.
 pub const FIRST_DIMENSION: u32 = 6;
+
+impl<C: ColorModel> Estimator<C> for Integrator<C> {
+    fn estimate(
+        &self,
+        scene: &Scene<C>,
+        sampler: &Sampler,
+        starts: &[Start<C>],
+        estimates: &mut Vec<Estimate<C::Sample>>,
+        stats: &mut Stats,
+    ) {
+        (**self).estimate(scene, sampler, starts, estimates, stats);
+    }
+}

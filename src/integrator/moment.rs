@@ -11,13 +11,13 @@ use crate::scene::Scene;
 /// Around one integrator.
 #[derive(Debug)]
 pub struct Moment<C: ColorModel> {
-    nested: Box<Integrator<C>>,
+    nested: Box<dyn Estimator<C>>,
 }
 
 impl<C: ColorModel> Moment<C> {
     pub(super) fn build(properties: &Properties<'_>, context: &()) -> Result<Self> {
         match &properties.children(Kind::Integrator)[..] {
-            [child] => Ok(Self { nested: Box::new(Integrator::build(child, context)?) }),
+            [child] => Ok(Self { nested: Box::new(Integrator::<C>::build(child, context)?) }),
             children => Err(properties
                 .error("", format!("moment needs one nested integrator, and has {}", children.len()))),
         }

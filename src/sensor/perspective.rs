@@ -2,7 +2,7 @@
 //! smaller, larger), or follows from `focal_length` (50mm by default) as on 35 mm film, whose diagonal
 //! it takes. Geometry nearer than `near_clip` or beyond `far_clip` is not seen.
 
-use glam::{Mat4, Vec2, Vec3, Vec4};
+use glam::{Mat4, Vec2, Vec4};
 
 use super::{Camera, Film, Mount};
 use crate::description::Properties;
@@ -95,6 +95,7 @@ impl Camera for Perspective {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::Vec3;
     use crate::description::{Description, Kind, Options};
     use std::path::Path;
 

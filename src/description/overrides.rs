@@ -1,0 +1,44 @@
+//! Changes to a description before anything is built from it: how the command line's options reach the
+//! scene, on the same validated way as the file's own values.
+
+use std::path::Path;
+
+use super::{Description, Kind, Node, NodeId, Property, Value};
+use crate::error::Location;
+
+impl Description {
+    /// Gives a node's property a value, in place of the file's where it has one.
+    pub fn set(&mut self, id: NodeId, name: &str, value: Value) {
+        let properties = &mut self.nodes[id.index()].properties;
+        properties.retain(|p| p.name != name);
+        properties.push(Property::new(name, value, command_line(), 0));
+    }
+
+    /// Makes a node another plugin of its kind; the properties that the file gave the old one count as
+    /// read, for the new one may not know them.
+    pub fn replace(&mut self, id: NodeId, plugin: &str) {
+        let node = &mut self.nodes[id.index()];
+        plugin.clone_into(&mut node.plugin);
+        node.location = command_line();
+        for property in &node.properties {
+            property.mark_read();
+        }
+    }
+
+    /// The first nested plugin of a kind, which is added as `plugin` where there is none.
+    pub fn child_or_new(&mut self, parent: NodeId, kind: Kind, plugin: &str) -> NodeId {
+        if let Some(child) = self.node(parent).children(kind).first() {
+            return child.node_id();
+        }
+        let id = NodeId(self.nodes.len() as u32);
+        self.nodes.push(Node::new(kind, plugin, command_line()));
+        let property = Property::new("", Value::Object(id), command_line(), 0);
+        self.nodes[parent.index()].properties.push(property);
+        id
+    }
+}
+
+/// Where the values come from.
+fn command_line() -> Location {
+    Location::of_file(Path::new("command line"))
+}
