@@ -341,14 +341,18 @@ fn fit_column(index: usize, z: &[f64; LEVELS]) -> [Sigmoid; LEVELS] {
         rgb[(largest + 2) % 3] *= ratio(index / RATIOS);
         rgb
     };
+    let level = z.map(|z| f64::from(position(z as f32)));
     let middle = LEVELS / 2;
     let mut column = [Sigmoid::default(); LEVELS];
     let first = observer.fit(rgb(z[middle]), grey_start(rgb(z[middle])));
     column[middle] = Sigmoid::from_centred(first);
     let mut march = |nodes: &mut dyn Iterator<Item = usize>| {
-        let mut a = first;
+        let (mut last, mut a, mut slope) = (level[middle], first, [0.0; 3]);
         for k in nodes {
-            a = observer.fit(rgb(z[k]), a);
+            let step = level[k] - last;
+            let found = observer.fit(rgb(z[k]), from_fn(|i| a[i] + step * slope[i]));
+            slope = from_fn(|i| (found[i] - a[i]) / step);
+            (last, a) = (level[k], found);
             column[k] = Sigmoid::from_centred(a);
         }
     };
