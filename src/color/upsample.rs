@@ -1,15 +1,17 @@
 //! Smooth reflectance spectra for RGB colours: S(λ) = ½ + ½·v/√(1 + v²) with v = (c₀λ + c₁)λ + c₂, whose
 //! colour under D65 is the given one (Jakob and Hanika, "A Low-Dimensional Function Space for Efficient
 //! Spectral Upsampling", 2019). [`fit`] solves for the three coefficients with a damped Gauss-Newton
-//! iteration; [`Table`] holds solutions on a grid over the cube and interpolates them.
+//! iteration; [`Table`] interpolates between solutions.
+
+mod table;
 
 use std::array::from_fn;
 use std::sync::OnceLock;
 
-use rayon::prelude::*;
-
 use super::cie;
 use super::d65::d65;
+
+pub use table::Table;
 
 /// A reflectance spectrum with values in [0, 1].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -232,124 +234,12 @@ fn grey_start(target: [f64; 3]) -> Coefficients {
     [0.0, 0.0, (mean - 0.5) / (mean * (1.0 - mean)).sqrt()]
 }
 
-/// Nodes along each axis of the table.
-const RESOLUTION: usize = 32;
-
-/// Solutions for the whole RGB cube. A colour is found by which component is largest, by that
-/// component z, and by the ratios of the next two (cyclically) to z; the nodes of z crowd near 0 and 1.
-#[derive(Debug)]
-pub struct Table {
-    /// z at its nodes, ascending.
-    z: [f32; RESOLUTION],
-    /// `[largest][second ratio][first ratio][z]`, each index but the first below [`RESOLUTION`].
-    nodes: Vec<Sigmoid>,
-}
-
-impl Table {
-    /// The table, computed when it is first asked for (a fraction of a second).
-    pub fn shared() -> &'static Self {
-        static SHARED: OnceLock<Table> = OnceLock::new();
-        SHARED.get_or_init(Self::new)
-    }
-
-    fn new() -> Self {
-        let smoothstep = |x: f64| x * x * (3.0 - 2.0 * x);
-        let z: [f64; RESOLUTION] = from_fn(|k| {
-            let x = k as f64 / (RESOLUTION - 1) as f64;
-            smoothstep(smoothstep(x)).clamp(1e-6, 1.0)
-        });
-        let observer = Observer::shared();
-        let columns: Vec<[Sigmoid; RESOLUTION]> = (0..3 * RESOLUTION * RESOLUTION)
-            .into_par_iter()
-            .map(|column| {
-                let largest = column / (RESOLUTION * RESOLUTION);
-                let ratio = |i: usize| (i % RESOLUTION) as f64 / (RESOLUTION - 1) as f64;
-                let (first, second) = (ratio(column), ratio(column / RESOLUTION));
-                fit_column(observer, &z, |z| {
-                    let mut rgb = [0.0; 3];
-                    rgb[largest] = z;
-                    rgb[(largest + 1) % 3] = z * first;
-                    rgb[(largest + 2) % 3] = z * second;
-                    rgb
-                })
-            })
-            .collect();
-        Self {
-            z: z.map(|z| z as f32),
-            nodes: columns.into_flattened(),
-        }
-    }
-
-    /// The spectrum of the linear BT.709 reflectance `rgb`, interpolated. Components are clamped to
-    /// [0, 1]; greys are exact and flat.
-    pub fn lookup(&self, rgb: [f32; 3]) -> Sigmoid {
-        let rgb = rgb.map(unit);
-        if rgb[0] == rgb[1] && rgb[1] == rgb[2] {
-            return Sigmoid::constant(rgb[0]);
-        }
-        let largest = match rgb {
-            [r, g, b] if r >= g && r >= b => 0,
-            [_, g, b] if g >= b => 1,
-            _ => 2,
-        };
-        let z = rgb[largest];
-        let last = (RESOLUTION - 1) as f32;
-        let axis = |value: f32| {
-            let position = value / z * last;
-            let node = (position as usize).min(RESOLUTION - 2);
-            (node, (position - node as f32).min(1.0))
-        };
-        let (x, fx) = axis(rgb[(largest + 1) % 3]);
-        let (y, fy) = axis(rgb[(largest + 2) % 3]);
-        let k = self.z.partition_point(|&node| node <= z);
-        let k = k.clamp(1, RESOLUTION - 1) - 1;
-        let fz = unit((z - self.z[k]) / (self.z[k + 1] - self.z[k]));
-
-        let mut c = [0.0; 3];
-        for corner in 0..8 {
-            let side = |bit: usize, f: f32| {
-                let upper = corner >> bit & 1;
-                (upper, if upper == 1 { f } else { 1.0 - f })
-            };
-            let ((i, wi), (j, wj), (l, wl)) = (side(0, fx), side(1, fy), side(2, fz));
-            let column = (largest * RESOLUTION + y + j) * RESOLUTION + x + i;
-            let node = &self.nodes[column * RESOLUTION + k + l];
-            for (sum, v) in c.iter_mut().zip(node.c) {
-                *sum += wi * wj * wl * v;
-            }
-        }
-        Sigmoid { c }
-    }
-}
-
-/// Solutions for `rgb(z)` at each node, each found from its neighbour, from the middle to both ends.
-fn fit_column(
-    observer: &Observer,
-    z: &[f64; RESOLUTION],
-    rgb: impl Fn(f64) -> [f64; 3],
-) -> [Sigmoid; RESOLUTION] {
-    let middle = RESOLUTION / 2;
-    let mut column = [Sigmoid::default(); RESOLUTION];
-    let first = observer.fit(rgb(z[middle]), grey_start(rgb(z[middle])));
-    column[middle] = Sigmoid::from_centred(first);
-    let mut march = |nodes: &mut dyn Iterator<Item = usize>| {
-        let mut a = first;
-        for k in nodes {
-            a = observer.fit(rgb(z[k]), a);
-            column[k] = Sigmoid::from_centred(a);
-        }
-    };
-    march(&mut (0..middle).rev());
-    march(&mut (middle + 1..RESOLUTION));
-    column
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     /// The colour of a reflectance under D65, by a midpoint rule that shares nothing with the fit's.
-    fn colour(spectrum: &Sigmoid) -> [f64; 3] {
+    pub(super) fn colour(spectrum: &Sigmoid) -> [f64; 3] {
         let mut xyz = [0.0; 3];
         for k in 0..940 {
             let lambda = 360.25 + 0.5 * k as f32;
@@ -362,7 +252,7 @@ mod tests {
     }
 
     /// A grid over the cube with its faces, edges and corners, then random colours and dark ones.
-    fn colours() -> impl Iterator<Item = [f32; 3]> {
+    pub(super) fn colours() -> impl Iterator<Item = [f32; 3]> {
         let grid = (0..729).map(|i| [i / 81, i / 9 % 9, i % 9].map(|v| v as f32 / 8.0));
         let mut state = 1u64;
         let mut random = move || {
@@ -378,7 +268,7 @@ mod tests {
         grid.chain(random)
     }
 
-    fn worst_error(upsample: impl Fn([f32; 3]) -> Sigmoid) -> (f64, [f32; 3]) {
+    pub(super) fn worst_error(upsample: impl Fn([f32; 3]) -> Sigmoid) -> (f64, [f32; 3]) {
         let error = |rgb: [f32; 3]| {
             let back = colour(&upsample(rgb));
             (0..3)
@@ -395,13 +285,6 @@ mod tests {
     fn a_fitted_spectrum_has_the_colour_it_was_made_for() {
         let (error, rgb) = worst_error(fit);
         assert!(error < 1e-3, "{error} at {rgb:?}");
-    }
-
-    #[test]
-    fn the_table_keeps_colours_too() {
-        let table = Table::shared();
-        let (error, rgb) = worst_error(|rgb| table.lookup(rgb));
-        assert!(error < 5e-3, "{error} at {rgb:?}");
     }
 
     #[test]
