@@ -202,6 +202,13 @@ impl Problems {
         }
     }
 
+    /// Adds problems that were found elsewhere.
+    pub fn extend(&mut self, problems: Vec<Problem>) {
+        if !problems.is_empty() {
+            self.push(Error { problems });
+        }
+    }
+
     /// The value, or `None` after noting what was wrong.
     pub fn take<T>(&mut self, result: Result<T>) -> Option<T> {
         result.map_err(|e| self.push(e)).ok()

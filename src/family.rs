@@ -57,55 +57,158 @@ const MITSUBA: &[(Kind, &[&str])] = &[
     (
         Kind::Shape,
         &[
-            "bsplinecurve", "cube", "cylinder", "disk", "ellipsoids", "ellipsoidsmesh", "instance",
-            "linearcurve", "merge", "obj", "ply", "rectangle", "sdfgrid", "serialized", "shapegroup", "sphere",
+            "bsplinecurve",
+            "cube",
+            "cylinder",
+            "disk",
+            "ellipsoids",
+            "ellipsoidsmesh",
+            "instance",
+            "linearcurve",
+            "merge",
+            "obj",
+            "ply",
+            "rectangle",
+            "sdfgrid",
+            "serialized",
+            "shapegroup",
+            "sphere",
         ],
     ),
     (
         Kind::Bsdf,
         &[
-            "blendbsdf", "bumpmap", "circular", "conductor", "dielectric", "diffuse", "hair", "mask",
-            "measured", "measured_polarized", "normalmap", "null", "plastic", "polarizer", "pplastic",
-            "principled", "principledthin", "retarder", "roughconductor", "roughdielectric", "roughplastic",
-            "thindielectric", "twosided",
+            "blendbsdf",
+            "bumpmap",
+            "circular",
+            "conductor",
+            "dielectric",
+            "diffuse",
+            "hair",
+            "mask",
+            "measured",
+            "measured_polarized",
+            "normalmap",
+            "null",
+            "plastic",
+            "polarizer",
+            "pplastic",
+            "principled",
+            "principledthin",
+            "retarder",
+            "roughconductor",
+            "roughdielectric",
+            "roughplastic",
+            "thindielectric",
+            "twosided",
         ],
     ),
     (
         Kind::Emitter,
         &[
-            "area", "constant", "directional", "directionalarea", "envmap", "point", "projector", "spot",
-            "sunsky", "timed_sunsky", "volumelight",
+            "area",
+            "constant",
+            "directional",
+            "directionalarea",
+            "envmap",
+            "point",
+            "projector",
+            "spot",
+            "sunsky",
+            "timed_sunsky",
+            "volumelight",
         ],
     ),
-    (Kind::Texture, &["bitmap", "checkerboard", "mesh_attribute", "volume"]),
+    (
+        Kind::Texture,
+        &["bitmap", "checkerboard", "mesh_attribute", "volume"],
+    ),
     (
         Kind::Spectrum,
-        &["blackbody", "d65", "irregular", "rawconstant", "regular", "srgb", "uniform"],
+        &[
+            "blackbody",
+            "d65",
+            "irregular",
+            "rawconstant",
+            "regular",
+            "srgb",
+            "uniform",
+        ],
     ),
     (
         Kind::Sensor,
-        &["batch", "distant", "irradiancemeter", "orthographic", "perspective", "radiancemeter", "thinlens"],
+        &[
+            "batch",
+            "distant",
+            "irradiancemeter",
+            "orthographic",
+            "perspective",
+            "radiancemeter",
+            "thinlens",
+        ],
     ),
     (Kind::Film, &["hdrfilm", "specfilm"]),
-    (Kind::Filter, &["box", "catmullrom", "gaussian", "lanczos", "mitchell", "tent"]),
-    (Kind::Sampler, &["independent", "ldsampler", "multijitter", "orthogonal", "stratified"]),
+    (
+        Kind::Filter,
+        &[
+            "box",
+            "catmullrom",
+            "gaussian",
+            "lanczos",
+            "mitchell",
+            "tent",
+        ],
+    ),
+    (
+        Kind::Sampler,
+        &[
+            "independent",
+            "ldsampler",
+            "multijitter",
+            "orthogonal",
+            "stratified",
+        ],
+    ),
     (
         Kind::Integrator,
         &[
-            "aov", "depth", "direct", "direct_projective", "moment", "path", "prb", "prb_basic",
-            "prb_projective", "prbvolpath", "ptracer", "stokes", "volpath", "volpathmis", "volprim_rf_basic",
+            "aov",
+            "depth",
+            "direct",
+            "direct_projective",
+            "moment",
+            "path",
+            "prb",
+            "prb_basic",
+            "prb_projective",
+            "prbvolpath",
+            "ptracer",
+            "stokes",
+            "volpath",
+            "volpathmis",
+            "volprim_rf_basic",
         ],
     ),
 ];
 
 /// The error for a plugin that its family does not have.
-pub(crate) fn unknown(properties: &Properties<'_>, kind: &str, name: &str, names: &[&str]) -> Error {
-    let known_to_mitsuba =
-        MITSUBA.iter().any(|(k, plugins)| *k == properties.kind() && plugins.contains(&name));
+pub(crate) fn unknown(
+    properties: &Properties<'_>,
+    kind: &str,
+    name: &str,
+    names: &[&str],
+) -> Error {
+    let known_to_mitsuba = MITSUBA
+        .iter()
+        .any(|(k, plugins)| *k == properties.kind() && plugins.contains(&name));
     let error = if known_to_mitsuba {
-        Error::unsupported(format!("{kind} \"{name}\" exists in Mitsuba but not in Étendue"))
+        Error::unsupported(format!(
+            "{kind} \"{name}\" exists in Mitsuba but not in Étendue"
+        ))
     } else {
         Error::input(format!("unknown {kind} \"{name}\"")).suggest(name, names.iter().copied())
     };
-    error.at(properties.location()).help(format!("there are {}", names.join(", ")))
+    error
+        .at(properties.location())
+        .help(format!("there are {}", names.join(", ")))
 }

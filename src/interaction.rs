@@ -49,7 +49,14 @@ impl Hit {
 
     /// A miss of a ray that ends at `t_max`.
     pub fn miss(t_max: f32) -> Self {
-        Self { t: t_max, u: 0.0, v: 0.0, instance: Self::NONE, shape: Self::NONE, primitive: 0 }
+        Self {
+            t: t_max,
+            u: 0.0,
+            v: 0.0,
+            instance: Self::NONE,
+            shape: Self::NONE,
+            primitive: 0,
+        }
     }
 
     /// Whether nothing was hit.
@@ -102,15 +109,30 @@ impl Interaction<'_> {
     /// A ray from here toward `direction` (unit length), off the surface by its rounding error.
     pub fn spawn(&self, direction: Vec3) -> Ray {
         let origin = offset::offset(self.position, self.error, self.normal, direction);
-        Ray { origin, direction, t_max: f32::INFINITY, time: self.time }
+        Ray {
+            origin,
+            direction,
+            t_max: f32::INFINITY,
+            time: self.time,
+        }
     }
 
     /// A ray from here to just before `target`, for asking whether it can be seen.
     pub fn spawn_to(&self, target: Vec3) -> Ray {
-        let origin = offset::offset(self.position, self.error, self.normal, target - self.position);
+        let origin = offset::offset(
+            self.position,
+            self.error,
+            self.normal,
+            target - self.position,
+        );
         let way = target - origin;
         let distance = way.length();
-        Ray { origin, direction: way / distance, t_max: distance * (1.0 - SHADOW_EPSILON), time: self.time }
+        Ray {
+            origin,
+            direction: way / distance,
+            t_max: distance * (1.0 - SHADOW_EPSILON),
+            time: self.time,
+        }
     }
 
     /// The same point after `transform`, seen along the world direction `direction`.

@@ -2,10 +2,10 @@
 //! through trees and writes images that agree with Mitsuba's. `ARCHITECTURE.md` says how it is built;
 //! the modules stand here in reading order, and each imports only from those above it.
 
+pub mod color;
 pub mod error;
 pub(crate) mod family;
 pub mod math;
-pub mod color;
 
 pub mod description;
 pub mod image;
@@ -29,3 +29,4 @@ pub mod scene;
 
 pub mod integrator;
 
+pub mod render;

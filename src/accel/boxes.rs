@@ -22,9 +22,18 @@ const SMALLEST: f32 = 1e-20;
 
 impl RayBoxes {
     pub(super) fn new(ray: &Ray) -> Self {
-        let bounded = |d: f32| if d.abs() < SMALLEST { SMALLEST.copysign(d) } else { d };
+        let bounded = |d: f32| {
+            if d.abs() < SMALLEST {
+                SMALLEST.copysign(d)
+            } else {
+                d
+            }
+        };
         let d = ray.direction;
-        Self { origin: ray.origin, inverse: Vec3::new(bounded(d.x), bounded(d.y), bounded(d.z)).recip() }
+        Self {
+            origin: ray.origin,
+            inverse: Vec3::new(bounded(d.x), bounded(d.y), bounded(d.z)).recip(),
+        }
     }
 
     /// Where the ray enters the box, 0 from inside; `None` where it passes by, or enters after `limit`.

@@ -22,7 +22,10 @@ impl Item {
     }
 
     pub(super) fn instance(index: u32) -> Self {
-        Self { shape: INSTANCE, index }
+        Self {
+            shape: INSTANCE,
+            index,
+        }
     }
 
     #[inline]
@@ -43,11 +46,19 @@ impl Group {
     pub(super) fn new((items, boxes): (Vec<Item>, Vec<Bounds>), method: Method) -> Self {
         let bounds = boxes.iter().copied().fold(Bounds::EMPTY, Bounds::union);
         match method {
-            Method::Brute => Self { items, tree: Tree::default(), bounds },
+            Method::Brute => Self {
+                items,
+                tree: Tree::default(),
+                bounds,
+            },
             Method::Tree => {
                 let (tree, order) = Tree::build(&boxes);
                 let items = order.into_iter().map(|i| items[i as usize]).collect();
-                Self { items, tree, bounds }
+                Self {
+                    items,
+                    tree,
+                    bounds,
+                }
             }
         }
     }

@@ -21,7 +21,7 @@ use group::{Group, Item};
 use triangle::Shear;
 
 /// What tracing costs, counted: the same on every machine.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Counts {
     /// Tree nodes entered.
     pub node_steps: u64,
@@ -68,22 +68,49 @@ pub struct Tracer {
 impl Tracer {
     /// `group_of[i]` is the group of shape `i`: 0 for the world, others for instances. Triangles with
     /// corners that are not finite must have been dropped before.
-    pub fn new(shapes: Vec<Arc<Geometry>>, group_of: &[u32], instances: Vec<Instance>, method: Method) -> Self {
-        let count = 1 + group_of.iter().copied().chain(instances.iter().map(|i| i.group)).max().unwrap_or(0);
+    pub fn new(
+        shapes: Vec<Arc<Geometry>>,
+        group_of: &[u32],
+        instances: Vec<Instance>,
+        method: Method,
+    ) -> Self {
+        let count = 1 + group_of
+            .iter()
+            .copied()
+            .chain(instances.iter().map(|i| i.group))
+            .max()
+            .unwrap_or(0);
         let members = |group: u32| {
-            let shapes = shapes.iter().zip(group_of).enumerate().filter(move |(_, (_, g))| **g == group);
+            let shapes = shapes
+                .iter()
+                .zip(group_of)
+                .enumerate()
+                .filter(move |(_, (_, g))| **g == group);
             shapes.flat_map(|(i, (shape, _))| {
-                (0..shape.primitive_count()).map(move |p| (Item::primitive(i as u32, p), shape.bounds(p)))
+                (0..shape.primitive_count())
+                    .map(move |p| (Item::primitive(i as u32, p), shape.bounds(p)))
             })
         };
-        let mut groups: Vec<Group> = (1..count).map(|g| Group::new(members(g).unzip(), method)).collect();
+        let mut groups: Vec<Group> = (1..count)
+            .map(|g| Group::new(members(g).unzip(), method))
+            .collect();
         let placed = instances.iter().enumerate().filter_map(|(i, instance)| {
             let bounds = groups[instance.group as usize - 1].bounds();
-            (!bounds.is_empty()).then(|| (Item::instance(i as u32), bounds.transformed(&instance.to_world)))
+            (!bounds.is_empty()).then(|| {
+                (
+                    Item::instance(i as u32),
+                    bounds.transformed(&instance.to_world),
+                )
+            })
         });
         let world = Group::new(members(0).chain(placed).unzip(), method);
         groups.insert(0, world);
-        Self { shapes, instances, groups, method }
+        Self {
+            shapes,
+            instances,
+            groups,
+            method,
+        }
     }
 
     /// A box around everything.
@@ -99,7 +126,12 @@ impl Tracer {
     }
 
     /// Whether anything lies on each ray, in the order of the rays.
-    pub fn occluded(&self, rays: impl Iterator<Item = Ray>, blocked: &mut Vec<bool>, counts: &mut Counts) {
+    pub fn occluded(
+        &self,
+        rays: impl Iterator<Item = Ray>,
+        blocked: &mut Vec<bool>,
+        counts: &mut Counts,
+    ) {
         let mut walk = Walk::new(self, counts);
         blocked.clear();
         blocked.extend(rays.map(|ray| walk.occluded(&ray)));
@@ -112,12 +144,17 @@ impl Tracer {
             return shape.interaction(ray, hit);
         }
         let to_world = &self.instances[hit.instance as usize].to_world;
-        shape.interaction(&to_local(to_world, ray), hit).transformed(to_world, ray.direction)
+        shape
+            .interaction(&to_local(to_world, ray), hit)
+            .transformed(to_world, ray.direction)
     }
 
     /// Primitives, each instance's counted once.
     pub fn primitive_count(&self) -> usize {
-        self.shapes.iter().map(|s| s.primitive_count() as usize).sum()
+        self.shapes
+            .iter()
+            .map(|s| s.primitive_count() as usize)
+            .sum()
     }
 
     /// How many instances there are.
@@ -134,7 +171,11 @@ impl Tracer {
 /// The ray in an instance's space; t keeps its meaning, since the direction is not normalised.
 fn to_local(to_world: &Transform, ray: &Ray) -> Ray {
     let to_local = to_world.inverse();
-    Ray { origin: to_local.point(ray.origin), direction: to_local.vector(ray.direction), ..*ray }
+    Ray {
+        origin: to_local.point(ray.origin),
+        direction: to_local.vector(ray.direction),
+        ..*ray
+    }
 }
 
 /// One thread's walk through the trees, ray after ray.
@@ -148,7 +189,11 @@ struct Walk<'t> {
 
 impl<'t> Walk<'t> {
     fn new(tracer: &'t Tracer, counts: &'t mut Counts) -> Self {
-        Self { tracer, counts, stacks: Default::default() }
+        Self {
+            tracer,
+            counts,
+            stacks: Default::default(),
+        }
     }
 
     fn closest(&mut self, ray: &Ray) -> Hit {
@@ -163,23 +208,38 @@ impl<'t> Walk<'t> {
 
     /// Meets a group: improves `best`, or with `ANY` returns true at the first hit. `instance` is the
     /// one through which the group is met, and `entry` where the ray enters its box.
-    fn group<const ANY: bool>(&mut self, group: u32, ray: &Ray, instance: u32, entry: f32, best: &mut Hit) -> bool {
+    fn group<const ANY: bool>(
+        &mut self,
+        group: u32,
+        ray: &Ray,
+        instance: u32,
+        entry: f32,
+        best: &mut Hit,
+    ) -> bool {
         let group = &self.tracer.groups[group as usize];
         let (boxes, shear) = (RayBoxes::new(ray), Shear::new(ray));
         let meet = |walk: &mut Self, item: &Item, best: &mut Hit| {
             walk.item::<ANY>(item, ray, (&boxes, &shear), (instance, entry), best)
         };
         match self.tracer.method {
-            Method::Brute => group.items().iter().any(|item| meet(self, item, best) && ANY),
+            Method::Brute => group
+                .items()
+                .iter()
+                .any(|item| meet(self, item, best) && ANY),
             Method::Tree => {
                 let level = usize::from(instance != Hit::NONE);
                 let mut stack = std::mem::take(&mut self.stacks[level]);
-                let found = group.tree().walk(&boxes, &mut stack, best.t, |walk_counts, range, limit| {
-                    self.counts.node_steps += walk_counts;
-                    let found = group.items()[range].iter().any(|item| meet(self, item, best) && ANY);
-                    *limit = best.t;
-                    found
-                });
+                let found =
+                    group
+                        .tree()
+                        .walk(&boxes, &mut stack, best.t, |walk_counts, range, limit| {
+                            self.counts.node_steps += walk_counts;
+                            let found = group.items()[range]
+                                .iter()
+                                .any(|item| meet(self, item, best) && ANY);
+                            *limit = best.t;
+                            found
+                        });
                 stack.clear();
                 self.stacks[level] = stack;
                 found
@@ -199,7 +259,9 @@ impl<'t> Walk<'t> {
     ) -> bool {
         if let Some(inner) = item.as_instance() {
             let Instance { to_world, group } = &self.tracer.instances[inner as usize];
-            let bounds = self.tracer.groups[*group as usize].bounds().transformed(to_world);
+            let bounds = self.tracer.groups[*group as usize]
+                .bounds()
+                .transformed(to_world);
             return boxes.entry(&bounds, best.t).is_some_and(|entry| {
                 self.group::<ANY>(*group, &to_local(to_world, ray), inner, entry, best)
             });
@@ -208,18 +270,39 @@ impl<'t> Walk<'t> {
         let (t, u, v, bounds) = match &*self.tracer.shapes[item.shape as usize] {
             Geometry::Mesh(mesh) => {
                 let corners = mesh.corners(item.index);
-                let Some((t, u, v)) = shear.intersect(corners, best.t) else { return false };
-                (t, u, v, corners.into_iter().fold(Bounds::EMPTY, Bounds::with))
+                let Some((t, u, v)) = shear.intersect(corners, best.t) else {
+                    return false;
+                };
+                (
+                    t,
+                    u,
+                    v,
+                    corners.into_iter().fold(Bounds::EMPTY, Bounds::with),
+                )
             }
             other => {
-                let limited = Ray { t_max: best.t, ..*ray };
-                let Some((t, u, v)) = other.intersect(item.index, &limited) else { return false };
+                let limited = Ray {
+                    t_max: best.t,
+                    ..*ray
+                };
+                let Some((t, u, v)) = other.intersect(item.index, &limited) else {
+                    return false;
+                };
                 (t, u, v, other.bounds(item.index))
             }
         };
         // Never before the boxes that lead here: so no order of walking can miss it.
-        let Some(own) = boxes.entry(&bounds, f32::INFINITY) else { return false };
-        let hit = Hit { t: t.max(own).max(entry), u, v, instance, shape: item.shape, primitive: item.index };
+        let Some(own) = boxes.entry(&bounds, f32::INFINITY) else {
+            return false;
+        };
+        let hit = Hit {
+            t: t.max(own).max(entry),
+            u,
+            v,
+            instance,
+            shape: item.shape,
+            primitive: item.index,
+        };
         if !hit.precedes(best) {
             return false;
         }

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::math::{random, warp};
-use crate::mesh::{Mesh, generate};
+use crate::mesh::{self, Mesh};
 use crate::shape::TriangleMesh;
 use glam::{DMat4, DVec3, Vec2, Vec3};
 
@@ -21,16 +21,24 @@ fn rays(count: u32, targets: &[Vec3]) -> Vec<Ray> {
             let origin = direction(1, i) * 2.5 * uniform(2, i);
             let direction = match i % 4 {
                 0 => (targets[i as usize % targets.len()] - origin).normalize(),
-                1 => Vec3::from_array(std::array::from_fn(|a| if a == i as usize / 4 % 3 { -1.0 } else { 0.0 })),
+                1 => Vec3::from_array(std::array::from_fn(|a| {
+                    if a == i as usize / 4 % 3 { -1.0 } else { 0.0 }
+                })),
                 _ => direction(3, i),
             };
-            Ray { origin, direction, t_max: f32::INFINITY, time: 0.0 }
+            Ray {
+                origin,
+                direction,
+                t_max: f32::INFINITY,
+                time: 0.0,
+            }
         })
         .collect()
 }
 
 fn both(shapes: &[Arc<Geometry>], groups: &[u32], instances: &[Instance]) -> [Tracer; 2] {
-    [Method::Brute, Method::Tree].map(|m| Tracer::new(shapes.to_vec(), groups, instances.to_vec(), m))
+    [Method::Brute, Method::Tree]
+        .map(|m| Tracer::new(shapes.to_vec(), groups, instances.to_vec(), m))
 }
 
 fn agree(tracers: &[Tracer; 2], rays: &[Ray]) -> usize {
@@ -40,7 +48,12 @@ fn agree(tracers: &[Tracer; 2], rays: &[Ray]) -> usize {
     tracers[1].closest(rays, &mut b, &mut counts);
     assert_eq!(a, b);
     let [mut c, mut d] = [Vec::new(), Vec::new()];
-    let limited = || rays.iter().enumerate().map(|(i, r)| Ray { t_max: uniform(9, i as u32) * 3.0, ..*r });
+    let limited = || {
+        rays.iter().enumerate().map(|(i, r)| Ray {
+            t_max: uniform(9, i as u32) * 3.0,
+            ..*r
+        })
+    };
     tracers[0].occluded(limited(), &mut c, &mut counts);
     tracers[1].occluded(limited(), &mut d, &mut counts);
     assert_eq!(c, d);
@@ -49,13 +62,21 @@ fn agree(tracers: &[Tracer; 2], rays: &[Ray]) -> usize {
 
 #[test]
 fn the_tree_and_brute_force_find_the_same_hits_to_the_bit() {
-    let mesh = generate::bumpy_sphere(3, 7);
+    let mesh = mesh::bumpy_sphere(3, 7);
     let targets = mesh.positions.clone();
     // The same mesh twice: every hit is a tie.
-    let shapes = [mesh.clone(), mesh, generate::cube()].map(|m| Arc::new(Geometry::Mesh(TriangleMesh::new(m))));
-    let transform = DMat4::from_translation(DVec3::new(0.3, 0.2, -1.0)) * DMat4::from_scale(DVec3::new(0.5, -2.0, 1.0));
+    let shapes =
+        [mesh.clone(), mesh, mesh::cube()].map(|m| Arc::new(Geometry::Mesh(TriangleMesh::new(m))));
+    let transform = DMat4::from_translation(DVec3::new(0.3, 0.2, -1.0))
+        * DMat4::from_scale(DVec3::new(0.5, -2.0, 1.0));
     let to_world = Transform::new(&transform).unwrap();
-    let instances = [Instance { to_world, group: 1 }, Instance { to_world: Transform::IDENTITY, group: 1 }];
+    let instances = [
+        Instance { to_world, group: 1 },
+        Instance {
+            to_world: Transform::IDENTITY,
+            group: 1,
+        },
+    ];
     let tracers = both(&shapes, &[0, 0, 1], &instances);
     assert!(agree(&tracers, &rays(20_000, &targets)) > 10_000);
 }
@@ -64,7 +85,7 @@ fn the_tree_and_brute_force_find_the_same_hits_to_the_bit() {
 fn scenes_of_nothing_and_of_one_triangle_can_be_traced() {
     let targets = [Vec3::ZERO];
     assert_eq!(agree(&both(&[], &[], &[]), &rays(100, &targets)), 0);
-    let mut one = generate::rectangle();
+    let mut one = mesh::rectangle();
     one.triangles.truncate(1);
     let shapes = [one, Mesh::default()].map(|m| Arc::new(Geometry::Mesh(TriangleMesh::new(m))));
     assert!(agree(&both(&shapes, &[0, 0], &[]), &rays(1000, &targets)) > 10);
@@ -72,11 +93,16 @@ fn scenes_of_nothing_and_of_one_triangle_can_be_traced() {
 
 #[test]
 fn equal_triangles_by_the_hundred_thousand_build_in_a_moment() {
-    let mut mesh = generate::rectangle();
+    let mut mesh = mesh::rectangle();
     mesh.triangles = vec![mesh.triangles[0]; 320_000];
     let shapes = vec![Arc::new(Geometry::Mesh(TriangleMesh::new(mesh)))];
     let tracer = Tracer::new(shapes, &[0], Vec::new(), Method::Tree);
-    let ray = Ray { origin: Vec3::new(0.5, -0.6, 1.0), direction: Vec3::NEG_Z, t_max: f32::INFINITY, time: 0.0 };
+    let ray = Ray {
+        origin: Vec3::new(0.5, -0.6, 1.0),
+        direction: Vec3::NEG_Z,
+        t_max: f32::INFINITY,
+        time: 0.0,
+    };
     let (mut hits, mut counts) = (Vec::new(), Counts::default());
     tracer.closest(&[ray], &mut hits, &mut counts);
     assert_eq!(hits[0].primitive, 0, "ties go to the lowest primitive");
@@ -84,9 +110,14 @@ fn equal_triangles_by_the_hundred_thousand_build_in_a_moment() {
 
 #[test]
 fn a_closed_mesh_has_no_hole_at_vertices_and_edges() {
-    let mesh = generate::bumpy_sphere(4, 3);
+    let mesh = mesh::bumpy_sphere(4, 3);
     let (positions, triangles) = (mesh.positions.clone(), mesh.triangles.clone());
-    let tracer = Tracer::new(vec![Arc::new(Geometry::Mesh(TriangleMesh::new(mesh)))], &[0], Vec::new(), Method::Tree);
+    let tracer = Tracer::new(
+        vec![Arc::new(Geometry::Mesh(TriangleMesh::new(mesh)))],
+        &[0],
+        Vec::new(),
+        Method::Tree,
+    );
     let n = 200_000;
     let rays: Vec<Ray> = (0..n)
         .map(|i| {
@@ -94,7 +125,12 @@ fn a_closed_mesh_has_no_hole_at_vertices_and_edges() {
             let share = if i % 2 == 0 { 0.0 } else { uniform(5, i) };
             let target = corners[0] + share * (corners[1] - corners[0]);
             let origin = direction(6, i) * 0.1;
-            Ray { origin, direction: (target - origin).normalize(), t_max: f32::INFINITY, time: 0.0 }
+            Ray {
+                origin,
+                direction: (target - origin).normalize(),
+                t_max: f32::INFINITY,
+                time: 0.0,
+            }
         })
         .collect();
     let (mut hits, mut counts) = (Vec::new(), Counts::default());

@@ -46,7 +46,10 @@ impl Tree {
             .iter()
             .map(|run| {
                 let bounds = boxes[run[0] as usize];
-                Aabb { min: Vec3A::from(bounds.min), max: Vec3A::from(bounds.max) }
+                Aabb {
+                    min: Vec3A::from(bounds.min),
+                    max: Vec3A::from(bounds.max),
+                }
             })
             .collect();
         if aabbs.is_empty() {
@@ -68,17 +71,33 @@ impl Tree {
     fn over_runs(bvh: &Bvh2, runs: &[&[u32]]) -> (Self, Vec<u32>) {
         let mut order = Vec::with_capacity(runs.iter().map(|r| r.len()).sum());
         let nodes = bvh.nodes.iter().map(|node| {
-            let bounds = Bounds { min: node.aabb.min.into(), max: node.aabb.max.into() };
+            let bounds = Bounds {
+                min: node.aabb.min.into(),
+                max: node.aabb.max.into(),
+            };
             if node.prim_count == 0 {
-                return Node { bounds, first: node.first_index, count: 0 };
+                return Node {
+                    bounds,
+                    first: node.first_index,
+                    count: 0,
+                };
             }
             let (first, start) = (order.len() as u32, node.first_index as usize);
             for leaf in &bvh.primitive_indices[start..start + node.prim_count as usize] {
                 order.extend_from_slice(runs[*leaf as usize]);
             }
-            Node { bounds, first, count: order.len() as u32 - first }
+            Node {
+                bounds,
+                first,
+                count: order.len() as u32 - first,
+            }
         });
-        (Self { nodes: nodes.collect() }, order)
+        (
+            Self {
+                nodes: nodes.collect(),
+            },
+            order,
+        )
     }
 
     /// Walks the leaves that the ray enters at or before `limit`, nearest first. `leaf` is given the
@@ -92,8 +111,12 @@ impl Tree {
         mut limit: f32,
         mut leaf: impl FnMut(u64, Range<usize>, &mut f32) -> bool,
     ) -> bool {
-        let Some(root) = self.nodes.first() else { return false };
-        let Some(entry) = boxes.entry(&root.bounds, limit) else { return false };
+        let Some(root) = self.nodes.first() else {
+            return false;
+        };
+        let Some(entry) = boxes.entry(&root.bounds, limit) else {
+            return false;
+        };
         stack.push((entry, 0));
         let mut steps = 0;
         while let Some((entry, index)) = stack.pop() {
@@ -122,7 +145,11 @@ impl Tree {
             }
             if node.count > 0 {
                 let first = node.first as usize;
-                if leaf(std::mem::take(&mut steps), first..first + node.count as usize, &mut limit) {
+                if leaf(
+                    std::mem::take(&mut steps),
+                    first..first + node.count as usize,
+                    &mut limit,
+                ) {
                     return true;
                 }
             }

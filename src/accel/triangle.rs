@@ -28,8 +28,16 @@ impl Shear {
             2
         };
         // Winding is kept where the ray goes backwards along z.
-        let (x, y) = if d[z] < 0.0 { ((z + 2) % 3, (z + 1) % 3) } else { ((z + 1) % 3, (z + 2) % 3) };
-        Self { origin: ray.origin, axes: [x, y, z], shear: [d[x] / d[z], d[y] / d[z], 1.0 / d[z]] }
+        let (x, y) = if d[z] < 0.0 {
+            ((z + 2) % 3, (z + 1) % 3)
+        } else {
+            ((z + 1) % 3, (z + 2) % 3)
+        };
+        Self {
+            origin: ray.origin,
+            axes: [x, y, z],
+            shear: [d[x] / d[z], d[y] / d[z], 1.0 / d[z]],
+        }
     }
 
     /// (t, u, v) with 0 < t ≤ `limit`; u and v are the second and third barycentric coordinates.
@@ -38,7 +46,11 @@ impl Shear {
         let [x, y, z] = self.axes;
         let [a, b, c] = corners.map(|p| {
             let p = (p - self.origin).to_array();
-            (p[x] - self.shear[0] * p[z], p[y] - self.shear[1] * p[z], p[z])
+            (
+                p[x] - self.shear[0] * p[z],
+                p[y] - self.shear[1] * p[z],
+                p[z],
+            )
         });
         let u = c.0 * b.1 - c.1 * b.0;
         let v = a.0 * c.1 - a.1 * c.0;

@@ -52,7 +52,11 @@ impl Spectrum {
     fn at(&self, lambda: f32) -> f32 {
         match self {
             Self::Flat(value) => *value,
-            Self::Upsampled { scale, sigmoid, illuminant } => {
+            Self::Upsampled {
+                scale,
+                sigmoid,
+                illuminant,
+            } => {
                 let light = if *illuminant { d65(lambda) } else { 1.0 };
                 scale * light * sigmoid.eval(lambda)
             }
@@ -72,7 +76,11 @@ pub struct SpectralTexel {
 /// Splits an RGB triple of any brightness into a scale and a reflectance, as Mitsuba does for light.
 fn scaled(rgb: [f32; 3]) -> (f32, [f32; 3]) {
     let scale = 2.0 * rgb[0].max(rgb[1]).max(rgb[2]);
-    if scale > 0.0 { (scale, rgb.map(|v| v / scale)) } else { (0.0, [0.0; 3]) }
+    if scale > 0.0 {
+        (scale, rgb.map(|v| v / scale))
+    } else {
+        (0.0, [0.0; 3])
+    }
 }
 
 impl<const N: usize> ColorModel for Bands<N> {
@@ -85,7 +93,13 @@ impl<const N: usize> ColorModel for Bands<N> {
     #[inline]
     fn wavelengths(&self, u: f32) -> [f32; N] {
         let width = self.width();
-        std::array::from_fn(|i| if i < self.count { cie::FIRST + (i as f32 + u) * width } else { 0.0 })
+        std::array::from_fn(|i| {
+            if i < self.count {
+                cie::FIRST + (i as f32 + u) * width
+            } else {
+                0.0
+            }
+        })
     }
 
     fn unit(&self) -> Samples<N> {
@@ -99,7 +113,11 @@ impl<const N: usize> ColorModel for Bands<N> {
                 check([*value], role)?;
                 let (scale, grey) = (2.0 * *value as f32, Sigmoid::constant(0.5));
                 if light {
-                    Spectrum::Upsampled { scale, sigmoid: grey, illuminant: true }
+                    Spectrum::Upsampled {
+                        scale,
+                        sigmoid: grey,
+                        illuminant: true,
+                    }
                 } else {
                     Spectrum::Flat(*value as f32)
                 }
@@ -112,18 +130,33 @@ impl<const N: usize> ColorModel for Bands<N> {
                 check(*rgb, role)?;
                 let rgb = rgb.map(|v| v as f32);
                 match role {
-                    Role::Reflectance => {
-                        Spectrum::Upsampled { scale: 1.0, sigmoid: fit(rgb), illuminant: false }
-                    }
+                    Role::Reflectance => Spectrum::Upsampled {
+                        scale: 1.0,
+                        sigmoid: fit(rgb),
+                        illuminant: false,
+                    },
                     Role::Emission | Role::Quantity => {
                         let (scale, rgb) = scaled(rgb);
-                        Spectrum::Upsampled { scale, sigmoid: fit(rgb), illuminant: light }
+                        Spectrum::Upsampled {
+                            scale,
+                            sigmoid: fit(rgb),
+                            illuminant: light,
+                        }
                     }
                 }
             }
             Color::Curve(points) => {
-                check(points.iter().map(|p| p.1), if light { role } else { Role::Quantity })?;
-                let bounded = |v: f64| if role == Role::Reflectance { v.clamp(0.0, 1.0) } else { v };
+                check(
+                    points.iter().map(|p| p.1),
+                    if light { role } else { Role::Quantity },
+                )?;
+                let bounded = |v: f64| {
+                    if role == Role::Reflectance {
+                        v.clamp(0.0, 1.0)
+                    } else {
+                        v
+                    }
+                };
                 Spectrum::Curve(points.iter().map(|p| (p.0, bounded(p.1))).collect())
             }
         })
@@ -140,7 +173,11 @@ impl<const N: usize> ColorModel for Bands<N> {
             Role::Emission | Role::Quantity => scaled(rgb),
         };
         let sigmoid = Table::shared().lookup(rgb);
-        SpectralTexel { scale, sigmoid, illuminant: role == Role::Emission }
+        SpectralTexel {
+            scale,
+            sigmoid,
+            illuminant: role == Role::Emission,
+        }
     }
 
     #[inline]
@@ -156,7 +193,9 @@ impl<const N: usize> ColorModel for Bands<N> {
         let edge = |i: usize| cie::FIRST + i as f32 * width;
         let mut names = ["R", "G", "B"].map(String::from).to_vec();
         // Zero-padded, for EXR sorts its channels by name.
-        names.extend((0..self.count).map(|i| format!("band.{i:02}_{:.1}-{:.1}nm", edge(i), edge(i + 1))));
+        names.extend(
+            (0..self.count).map(|i| format!("band.{i:02}_{:.1}-{:.1}nm", edge(i), edge(i + 1))),
+        );
         names
     }
 
@@ -184,13 +223,17 @@ mod tests {
     /// The RGB that N bands make of a colour, averaged over shifts of the comb.
     fn rgb_of<const N: usize>(count: usize, color: &Color, role: Role, light: &Color) -> [f64; 3] {
         let bands = Bands::<N>::new(count).unwrap();
-        let (color, light) = (bands.store(color, role).unwrap(), bands.store(light, Role::Emission).unwrap());
+        let (color, light) = (
+            bands.store(color, role).unwrap(),
+            bands.store(light, Role::Emission).unwrap(),
+        );
         let mut sum = [0.0; 3];
         let n = 200;
         for i in 0..n {
             let w = bands.wavelengths((i as f32 + 0.5) / n as f32);
             let mut out = vec![0.0; 3 + count];
-            let value = Bands::<N>::evaluate(&color, &w) * Bands::<N>::evaluate(&light, &w) * bands.unit();
+            let value =
+                Bands::<N>::evaluate(&color, &w) * Bands::<N>::evaluate(&light, &w) * bands.unit();
             bands.develop(&value, &w, &mut out);
             for c in 0..3 {
                 sum[c] += f64::from(out[c]) / f64::from(n);
@@ -215,7 +258,10 @@ mod tests {
                 rgb_of::<32>(32, &one, Role::Quantity, &color),
             ] {
                 for c in 0..3 {
-                    assert!((result[c] / expected[c] - 1.0).abs() < 0.01, "{color:?} {result:?} {expected:?}");
+                    assert!(
+                        (result[c] / expected[c] - 1.0).abs() < 0.01,
+                        "{color:?} {result:?} {expected:?}"
+                    );
                 }
             }
         }

@@ -66,7 +66,7 @@ pub fn luminance(rgb: [f32; 3]) -> f32 {
 }
 
 /// Linear BT.709 of CIE XYZ.
-pub fn xyz_to_rgb(xyz: [f64; 3]) -> [f64; 3] {
+pub(super) fn xyz_to_rgb(xyz: [f64; 3]) -> [f64; 3] {
     const M: [[f64; 3]; 3] = [
         [3.240_479, -1.537_150, -0.498_535],
         [-0.969_256, 1.875_991, 0.041_556],

@@ -37,7 +37,11 @@ impl ColorModel for Mono {
 
     fn texel(&self, rgb: [f32; 3], role: Role) -> f32 {
         let value = luminance(rgb);
-        if role == Role::Reflectance { value.clamp(0.0, 1.0) } else { value }
+        if role == Role::Reflectance {
+            value.clamp(0.0, 1.0)
+        } else {
+            value
+        }
     }
 
     fn evaluate_texel(texel: &f32, _wavelengths: &()) -> Samples<1> {

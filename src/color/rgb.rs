@@ -38,7 +38,11 @@ impl ColorModel for Rgb {
                         std::array::from_fn(|i| value[i] / one[i])
                     }
                 };
-                if role == Role::Reflectance { rgb.map(|v| v.clamp(0.0, 1.0)) } else { rgb }
+                if role == Role::Reflectance {
+                    rgb.map(|v| v.clamp(0.0, 1.0))
+                } else {
+                    rgb
+                }
             }
         };
         check(rgb, role)?;
@@ -51,7 +55,11 @@ impl ColorModel for Rgb {
     }
 
     fn texel(&self, rgb: [f32; 3], role: Role) -> [f32; 3] {
-        if role == Role::Reflectance { rgb.map(|v| v.clamp(0.0, 1.0)) } else { rgb }
+        if role == Role::Reflectance {
+            rgb.map(|v| v.clamp(0.0, 1.0))
+        } else {
+            rgb
+        }
     }
 
     #[inline]
@@ -79,7 +87,9 @@ pub(super) fn check(values: impl IntoIterator<Item = f64>, role: Role) -> Result
             Role::Reflectance if !(0.0..=1.0).contains(&v) => {
                 return Err(format!("a reflectance lies in [0, 1], and {v} does not"));
             }
-            Role::Emission if v < 0.0 => return Err(format!("emission cannot be negative, and {v} is")),
+            Role::Emission if v < 0.0 => {
+                return Err(format!("emission cannot be negative, and {v} is"));
+            }
             _ => {}
         }
     }
@@ -128,15 +138,24 @@ mod tests {
         for (color, expected) in cases {
             let rgb = Rgb.store(&color, Role::Emission).unwrap();
             for c in 0..3 {
-                assert!((rgb[c] - expected[c]).abs() < 2e-3 * expected[c], "{color:?}: {rgb:?} {expected:?}");
+                assert!(
+                    (rgb[c] - expected[c]).abs() < 2e-3 * expected[c],
+                    "{color:?}: {rgb:?} {expected:?}"
+                );
             }
         }
     }
 
     #[test]
     fn reflectances_outside_the_unit_interval_are_refused() {
-        assert!(Rgb.store(&Color::Rgb([0.5, 1.2, 0.0]), Role::Reflectance).is_err());
-        assert!(Rgb.store(&Color::Rgb([0.5, 1.2, 0.0]), Role::Emission).is_ok());
+        assert!(
+            Rgb.store(&Color::Rgb([0.5, 1.2, 0.0]), Role::Reflectance)
+                .is_err()
+        );
+        assert!(
+            Rgb.store(&Color::Rgb([0.5, 1.2, 0.0]), Role::Emission)
+                .is_ok()
+        );
         assert!(Rgb.store(&Color::Grey(-1.0), Role::Emission).is_err());
     }
 }

@@ -194,6 +194,20 @@ struct Node {
     visited: AtomicBool,
 }
 
+impl Node {
+    fn new(kind: Kind, plugin: &str, location: Location) -> Self {
+        Self {
+            kind,
+            plugin: plugin.to_owned(),
+            id: None,
+            location,
+            properties: Vec::new(),
+            asked: Mutex::default(),
+            visited: AtomicBool::new(false),
+        }
+    }
+}
+
 /// How a scene file is to be read.
 #[derive(Clone, Debug, Default)]
 pub struct Options {

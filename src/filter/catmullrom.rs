@@ -1,4 +1,4 @@
-//! `catmullrom`: 
+//! `catmullrom`:
 
 use super::Kernel;
 use crate::description::Properties;

@@ -1,4 +1,4 @@
-//! `gaussian`: 
+//! `gaussian`:
 
 use super::Kernel;
 use crate::description::Properties;
@@ -14,10 +14,15 @@ impl Gaussian {
     pub(super) fn build(properties: &Properties<'_>, _context: &()) -> Result<Self> {
         let stddev = properties.float("stddev")?.unwrap_or(0.5);
         if !(0.01..=super::MAX_RADIUS / 4.0).contains(&stddev) {
-            let message = format!("a standard deviation of {stddev} pixels is not between 0.01 and {}", super::MAX_RADIUS / 4.0);
+            let message = format!(
+                "a standard deviation of {stddev} pixels is not between 0.01 and {}",
+                super::MAX_RADIUS / 4.0
+            );
             return Err(properties.error("stddev", message));
         }
-        Ok(Self { stddev: stddev as f32 })
+        Ok(Self {
+            stddev: stddev as f32,
+        })
     }
 
     fn bell(&self, x: f32) -> f32 {

@@ -1,4 +1,4 @@
-//! `lanczos`: 
+//! `lanczos`:
 
 use super::Kernel;
 use crate::description::Properties;
@@ -14,9 +14,14 @@ impl Lanczos {
     pub(super) fn build(properties: &Properties<'_>, _context: &()) -> Result<Self> {
         let lobes = properties.integer("lobes")?.unwrap_or(3);
         if !(1..=super::MAX_RADIUS as i64).contains(&lobes) {
-            return Err(properties.error("lobes", format!("{lobes} lobes; 1 to {} are possible", super::MAX_RADIUS)));
+            return Err(properties.error(
+                "lobes",
+                format!("{lobes} lobes; 1 to {} are possible", super::MAX_RADIUS),
+            ));
         }
-        Ok(Self { lobes: lobes as f32 })
+        Ok(Self {
+            lobes: lobes as f32,
+        })
     }
 }
 

@@ -1,4 +1,4 @@
-//! `mitchell`: 
+//! `mitchell`:
 
 use super::Kernel;
 use crate::description::Properties;
@@ -14,7 +14,10 @@ pub struct Mitchell {
 impl Mitchell {
     pub(super) fn build(properties: &Properties<'_>, _context: &()) -> Result<Self> {
         let parameter = |name| Ok(properties.float(name)?.unwrap_or(1.0 / 3.0) as f32);
-        Ok(Self { b: parameter("B")?, c: parameter("C")? })
+        Ok(Self {
+            b: parameter("B")?,
+            c: parameter("C")?,
+        })
     }
 }
 

@@ -61,7 +61,10 @@ fn cubic(b: f32, c: f32, x: f32) -> f32 {
     let value = if x < 1.0 {
         (12.0 - 9.0 * b - 6.0 * c) * x3 + (-18.0 + 12.0 * b + 6.0 * c) * x2 + (6.0 - 2.0 * b)
     } else if x < 2.0 {
-        (-b - 6.0 * c) * x3 + (6.0 * b + 30.0 * c) * x2 + (-12.0 * b - 48.0 * c) * x + (8.0 * b + 24.0 * c)
+        (-b - 6.0 * c) * x3
+            + (6.0 * b + 30.0 * c) * x2
+            + (-12.0 * b - 48.0 * c) * x
+            + (8.0 * b + 24.0 * c)
     } else {
         0.0
     };
@@ -78,7 +81,8 @@ mod tests {
     fn every_filter_is_even_ends_at_its_radius_and_has_a_positive_integral() {
         for name in Filter::NAMES {
             let text = format!(r#"<scene version="3.0.0"><rfilter type="{name}"/></scene>"#);
-            let scene = Description::parse(&text, Path::new("test.xml"), &Options::default()).unwrap();
+            let scene =
+                Description::parse(&text, Path::new("test.xml"), &Options::default()).unwrap();
             let filter = Filter::build(&scene.root().children(Kind::Filter)[0], &()).unwrap();
             let n = 4000;
             let mut integral = 0.0;
@@ -87,7 +91,10 @@ mod tests {
                 assert!((filter.eval(x) - filter.eval(-x)).abs() < 1e-6, "{name}");
                 integral += filter.eval(x);
             }
-            assert!(integral > 0.0 && filter.eval(0.0) >= filter.eval(0.4 * filter.radius()), "{name}");
+            assert!(
+                integral > 0.0 && filter.eval(0.0) >= filter.eval(0.4 * filter.radius()),
+                "{name}"
+            );
             assert_eq!(filter.eval(filter.radius() + 1e-3), 0.0, "{name}");
         }
     }

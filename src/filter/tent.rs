@@ -1,4 +1,4 @@
-//! `tent`: 
+//! `tent`:
 
 use super::Kernel;
 use crate::description::Properties;
@@ -12,7 +12,9 @@ pub struct Tent {
 
 impl Tent {
     pub(super) fn build(properties: &Properties<'_>, _context: &()) -> Result<Self> {
-        Ok(Self { radius: super::radius(properties, 1.0)? })
+        Ok(Self {
+            radius: super::radius(properties, 1.0)?,
+        })
     }
 }
 

@@ -39,7 +39,10 @@ impl Direct {
         let count = |name: &'static str, default: u32| {
             let n = properties.integer(name)?.unwrap_or(i64::from(default));
             if !(0..=MAX_SAMPLES).contains(&n) {
-                return Err(properties.error(name, format!("{n} samples; 0 to {MAX_SAMPLES} are possible")));
+                return Err(properties.error(
+                    name,
+                    format!("{n} samples; 0 to {MAX_SAMPLES} are possible"),
+                ));
             }
             Ok(n as u32)
         };
@@ -47,16 +50,29 @@ impl Direct {
         if properties.has("shading_samples") {
             for name in ["emitter_samples", "bsdf_samples"] {
                 if properties.has(name) {
-                    return Err(properties.error(name, format!("{name} and shading_samples exclude each other")));
+                    return Err(properties.error(
+                        name,
+                        format!("{name} and shading_samples exclude each other"),
+                    ));
                 }
             }
         }
-        let (emitter_samples, bsdf_samples) = (count("emitter_samples", shading)?, count("bsdf_samples", shading)?);
+        let (emitter_samples, bsdf_samples) = (
+            count("emitter_samples", shading)?,
+            count("bsdf_samples", shading)?,
+        );
         if emitter_samples + bsdf_samples == 0 {
-            return Err(properties.error("bsdf_samples", "direct needs at least one sample of either kind"));
+            return Err(properties.error(
+                "bsdf_samples",
+                "direct needs at least one sample of either kind",
+            ));
         }
         let hide_emitters = properties.boolean("hide_emitters")?.unwrap_or(false);
-        Ok(Self { emitter_samples, bsdf_samples, hide_emitters })
+        Ok(Self {
+            emitter_samples,
+            bsdf_samples,
+            hide_emitters,
+        })
     }
 
     /// The share of samples of a kind in both.
@@ -75,12 +91,17 @@ impl<C: ColorModel> Estimator<C> for Direct {
         stats: &mut Stats,
     ) {
         estimates.clear();
-        let (light_share, bsdf_share) = (self.share(self.emitter_samples), self.share(self.bsdf_samples));
-        let (mut rays, mut hits): (Vec<Ray>, _) = (starts.iter().map(|s| s.ray).collect(), Vec::new());
+        let (light_share, bsdf_share) = (
+            self.share(self.emitter_samples),
+            self.share(self.bsdf_samples),
+        );
+        let (mut rays, mut hits): (Vec<Ray>, _) =
+            (starts.iter().map(|s| s.ray).collect(), Vec::new());
         stats.camera_rays += rays.len() as u64;
         scene.closest(&rays, &mut hits, &mut stats.tracing);
 
-        let (mut shadows, mut probes): (Vec<Probe<C::Sample>>, Vec<Probe<C::Sample>>) = (Vec::new(), Vec::new());
+        let mut shadows: Vec<Probe<C::Sample>> = Vec::new();
+        let mut probes: Vec<Probe<C::Sample>> = Vec::new();
         for (slot, (start, hit)) in starts.iter().zip(&hits).enumerate() {
             let (w, slot) = (&start.wavelengths, slot as u32);
             let at = (!hit.is_miss()).then(|| scene.interaction(&start.ray, hit));
@@ -88,10 +109,15 @@ impl<C: ColorModel> Estimator<C> for Direct {
                 Some(at) => scene.emitted(at, start.ray.origin, w),
                 None => scene.surrounding(start.ray.direction, w),
             };
-            let radiance = emission.filter(|_| !self.hide_emitters).map_or(C::Sample::zero(), |e| e.0);
+            let radiance = emission
+                .filter(|_| !self.hide_emitters)
+                .map_or(C::Sample::zero(), |e| e.0);
             let surrounded = scene.has_environment() && !self.hide_emitters;
             let alpha = if at.is_some() || surrounded { 1.0 } else { 0.0 };
-            estimates.push(Estimate { radiance: radiance * scene.color().unit(), alpha });
+            estimates.push(Estimate {
+                radiance: radiance * scene.color().unit(),
+                alpha,
+            });
             let Some(at) = at else { continue };
             stats.shaded += 1;
             let material = scene.material(&at);
@@ -99,32 +125,62 @@ impl<C: ColorModel> Estimator<C> for Direct {
             stream.seek(FIRST_DIMENSION);
             for _ in 0..self.emitter_samples {
                 let (u1, u2) = (stream.next_1d(sampler), stream.next_2d(sampler));
-                let Some(light) = scene.sample_light(at.position, u1, u2, w) else { continue };
-                let Some(value) = material.eval(&at, at.wi, at.frame.to_local(light.direction), w) else {
+                let Some(light) = scene.sample_light(at.position, u1, u2, w) else {
                     continue;
                 };
-                let other = if light.delta { 0.0 } else { value.pdf * bsdf_share };
-                let weight = power(light.pdf * light_share, other) / (light.pdf * self.emitter_samples as f32);
+                let Some(value) = material.eval(&at, at.wi, at.frame.to_local(light.direction), w)
+                else {
+                    continue;
+                };
+                let other = if light.delta {
+                    0.0
+                } else {
+                    value.pdf * bsdf_share
+                };
+                let weight = power(light.pdf * light_share, other)
+                    / (light.pdf * self.emitter_samples as f32);
                 let factor = scene.color().unit() * value.value * light.radiance * weight;
                 if !factor.is_black() {
-                    let ray = light.target.map_or_else(|| at.spawn(light.direction), |target| at.spawn_to(target));
-                    shadows.push(Probe { ray, factor, slot, scattered: None });
+                    let ray = light
+                        .target
+                        .map_or_else(|| at.spawn(light.direction), |target| at.spawn_to(target));
+                    shadows.push(Probe {
+                        ray,
+                        factor,
+                        slot,
+                        scattered: None,
+                    });
                 }
             }
             for _ in 0..self.bsdf_samples {
                 let (u1, u2) = (stream.next_1d(sampler), stream.next_2d(sampler));
-                let Some(sample) = material.sample(&at, at.wi, u1, u2, w) else { continue };
+                let Some(sample) = material.sample(&at, at.wi, u1, u2, w) else {
+                    continue;
+                };
                 let factor = scene.color().unit() * sample.weight / self.bsdf_samples as f32;
                 let ray = at.spawn(at.frame.to_world(sample.wo));
                 let scattered = (!sample.delta).then_some((at.position, sample.pdf));
-                probes.push(Probe { ray, factor, slot, scattered });
+                probes.push(Probe {
+                    ray,
+                    factor,
+                    slot,
+                    scattered,
+                });
             }
         }
 
         let mut blocked = Vec::new();
         stats.shadow_rays += shadows.len() as u64;
-        scene.occluded(shadows.iter().map(|s| s.ray), &mut blocked, &mut stats.tracing);
-        for (shadow, _) in shadows.iter().zip(&blocked).filter(|(_, blocked)| !**blocked) {
+        scene.occluded(
+            shadows.iter().map(|s| s.ray),
+            &mut blocked,
+            &mut stats.tracing,
+        );
+        for (shadow, _) in shadows
+            .iter()
+            .zip(&blocked)
+            .filter(|(_, blocked)| !**blocked)
+        {
             estimates[shadow.slot as usize].radiance += shadow.factor;
         }
 
@@ -140,8 +196,12 @@ impl<C: ColorModel> Estimator<C> for Direct {
             } else {
                 scene.emitted(&scene.interaction(&probe.ray, hit), from, w)
             };
-            let Some((radiance, light_pdf)) = emission else { continue };
-            let weight = probe.scattered.map_or(1.0, |(_, pdf)| power(pdf * bsdf_share, light_pdf * light_share));
+            let Some((radiance, light_pdf)) = emission else {
+                continue;
+            };
+            let weight = probe.scattered.map_or(1.0, |(_, pdf)| {
+                power(pdf * bsdf_share, light_pdf * light_share)
+            });
             estimates[probe.slot as usize].radiance += probe.factor * radiance * weight;
         }
     }

@@ -17,9 +17,16 @@ pub struct Moment<C: ColorModel> {
 impl<C: ColorModel> Moment<C> {
     pub(super) fn build(properties: &Properties<'_>, context: &()) -> Result<Self> {
         match &properties.children(Kind::Integrator)[..] {
-            [child] => Ok(Self { nested: Box::new(Integrator::<C>::build(child, context)?) }),
-            children => Err(properties
-                .error("", format!("moment needs one nested integrator, and has {}", children.len()))),
+            [child] => Ok(Self {
+                nested: Box::new(Integrator::<C>::build(child, context)?),
+            }),
+            children => Err(properties.error(
+                "",
+                format!(
+                    "moment needs one nested integrator, and has {}",
+                    children.len()
+                ),
+            )),
         }
     }
 }
@@ -33,6 +40,7 @@ impl<C: ColorModel> Estimator<C> for Moment<C> {
         estimates: &mut Vec<Estimate<C::Sample>>,
         stats: &mut Stats,
     ) {
-        self.nested.estimate(scene, sampler, starts, estimates, stats);
+        self.nested
+            .estimate(scene, sampler, starts, estimates, stats);
     }
 }

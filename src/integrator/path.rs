@@ -25,7 +25,11 @@ pub struct Path {
 
 impl Default for Path {
     fn default() -> Self {
-        Self { max_depth: u32::MAX, rr_depth: 5, hide_emitters: false }
+        Self {
+            max_depth: u32::MAX,
+            rr_depth: 5,
+            hide_emitters: false,
+        }
     }
 }
 
@@ -62,7 +66,10 @@ impl Path {
         let depth = |name: &'static str, default: i64, least: i64| {
             let depth = properties.integer(name)?.unwrap_or(default);
             if depth < least {
-                return Err(properties.error(name, format!("{name} must be at least {least}, and {depth} is not")));
+                return Err(properties.error(
+                    name,
+                    format!("{name} must be at least {least}, and {depth} is not"),
+                ));
             }
             Ok(u32::try_from(depth).unwrap_or(u32::MAX))
         };
@@ -91,7 +98,9 @@ impl Path {
             None => scene.surrounding(walker.ray.direction, &walker.wavelengths),
         };
         if let Some((radiance, light_pdf)) = emission.filter(|_| !hidden) {
-            let weight = walker.scattered.map_or(1.0, |(_, pdf)| power(pdf, light_pdf));
+            let weight = walker
+                .scattered
+                .map_or(1.0, |(_, pdf)| power(pdf, light_pdf));
             estimate.radiance += walker.throughput * radiance * weight;
         }
         if depth == 0 {
@@ -108,13 +117,21 @@ impl Path {
         walker: &mut Walker<C>,
         at: &Interaction<'_>,
     ) -> Option<Shadow<C::Sample>> {
-        let (u1, u2) = (walker.stream.next_1d(sampler), walker.stream.next_2d(sampler));
+        let (u1, u2) = (
+            walker.stream.next_1d(sampler),
+            walker.stream.next_2d(sampler),
+        );
         let material = scene.material(at);
         if !material.is_smooth() {
             return None;
         }
-        let LightSample { direction, target, radiance, pdf, delta } =
-            scene.sample_light(at.position, u1, u2, &walker.wavelengths)?;
+        let LightSample {
+            direction,
+            target,
+            radiance,
+            pdf,
+            delta,
+        } = scene.sample_light(at.position, u1, u2, &walker.wavelengths)?;
         let value = material.eval(at, at.wi, at.frame.to_local(direction), &walker.wavelengths)?;
         let weight = if delta { 1.0 } else { power(pdf, value.pdf) };
         let contribution = walker.throughput * value.value * radiance * (weight / pdf);
@@ -125,7 +142,11 @@ impl Path {
             Some(target) => at.spawn_to(target),
             None => at.spawn(direction),
         };
-        Some(Shadow { ray, contribution, slot: walker.slot })
+        Some(Shadow {
+            ray,
+            contribution,
+            slot: walker.slot,
+        })
     }
 
     /// Turns the path at `at`; `None` where it ends there.
@@ -137,8 +158,13 @@ impl Path {
         mut walker: Walker<C>,
         at: &Interaction<'_>,
     ) -> Option<Walker<C>> {
-        let (u1, u2) = (walker.stream.next_1d(sampler), walker.stream.next_2d(sampler));
-        let sample = scene.material(at).sample(at, at.wi, u1, u2, &walker.wavelengths)?;
+        let (u1, u2) = (
+            walker.stream.next_1d(sampler),
+            walker.stream.next_2d(sampler),
+        );
+        let sample = scene
+            .material(at)
+            .sample(at, at.wi, u1, u2, &walker.wavelengths)?;
         walker.throughput *= sample.weight;
         walker.eta *= sample.eta;
         walker.ray = at.spawn(at.frame.to_world(sample.wo));
@@ -147,7 +173,8 @@ impl Path {
             return None;
         }
         if depth + 1 >= self.rr_depth {
-            let survival = (walker.throughput.max_value() * walker.eta * walker.eta).min(MAX_SURVIVAL);
+            let survival =
+                (walker.throughput.max_value() * walker.eta * walker.eta).min(MAX_SURVIVAL);
             if walker.stream.next_1d(sampler) >= survival {
                 return None;
             }
@@ -167,7 +194,13 @@ impl<C: ColorModel> Estimator<C> for Path {
         stats: &mut Stats,
     ) {
         estimates.clear();
-        estimates.resize(starts.len(), Estimate { radiance: C::Sample::zero(), alpha: 0.0 });
+        estimates.resize(
+            starts.len(),
+            Estimate {
+                radiance: C::Sample::zero(),
+                alpha: 0.0,
+            },
+        );
         if self.max_depth == 0 {
             return;
         }
@@ -192,7 +225,11 @@ impl<C: ColorModel> Estimator<C> for Path {
             }
             rays.clear();
             rays.extend(walkers.iter().map(|w| w.ray));
-            *if depth == 0 { &mut stats.camera_rays } else { &mut stats.bounce_rays } += rays.len() as u64;
+            *if depth == 0 {
+                &mut stats.camera_rays
+            } else {
+                &mut stats.bounce_rays
+            } += rays.len() as u64;
             scene.closest(&rays, &mut hits, &mut stats.tracing);
 
             let mut hits = hits.iter();
@@ -200,7 +237,13 @@ impl<C: ColorModel> Estimator<C> for Path {
                 .into_iter()
                 .filter_map(|mut walker| {
                     let hit = hits.next().expect("every ray has its hit");
-                    let at = self.arrive(scene, depth, &walker, hit, &mut estimates[walker.slot as usize])?;
+                    let at = self.arrive(
+                        scene,
+                        depth,
+                        &walker,
+                        hit,
+                        &mut estimates[walker.slot as usize],
+                    )?;
                     if depth + 1 >= self.max_depth {
                         return None;
                     }
@@ -212,8 +255,16 @@ impl<C: ColorModel> Estimator<C> for Path {
                 .collect();
 
             stats.shadow_rays += shadows.len() as u64;
-            scene.occluded(shadows.iter().map(|s| s.ray), &mut blocked, &mut stats.tracing);
-            for (shadow, _) in shadows.drain(..).zip(&blocked).filter(|(_, blocked)| !**blocked) {
+            scene.occluded(
+                shadows.iter().map(|s| s.ray),
+                &mut blocked,
+                &mut stats.tracing,
+            );
+            for (shadow, _) in shadows
+                .drain(..)
+                .zip(&blocked)
+                .filter(|(_, blocked)| !**blocked)
+            {
                 estimates[shadow.slot as usize].radiance += shadow.contribution;
             }
         }

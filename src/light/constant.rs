@@ -19,17 +19,36 @@ pub struct Constant<C: ColorModel> {
 const PDF: f32 = 0.25 * FRAC_1_PI;
 
 impl<C: ColorModel> Constant<C> {
-    pub(super) fn build(properties: &Properties<'_>, context: &LightContext<'_, C>) -> Result<Self> {
-        let radiance = context.palettes.colors.color(properties, "radiance", Role::Emission, Color::D65(1.0))?;
+    pub(super) fn build(
+        properties: &Properties<'_>,
+        context: &LightContext<'_, C>,
+    ) -> Result<Self> {
+        let radiance = context.palettes.colors.color(
+            properties,
+            "radiance",
+            Role::Emission,
+            Color::D65(1.0),
+        )?;
         Ok(Self { radiance })
     }
 }
 
 impl<C: ColorModel> Emitter<C> for Constant<C> {
-    fn sample(&self, _from: Vec3, u: Vec2, wavelengths: &C::Wavelengths) -> Option<LightSample<C::Sample>> {
+    fn sample(
+        &self,
+        _from: Vec3,
+        u: Vec2,
+        wavelengths: &C::Wavelengths,
+    ) -> Option<LightSample<C::Sample>> {
         let direction = warp::uniform_sphere(u);
         let radiance = C::evaluate(&self.radiance, wavelengths);
-        Some(LightSample { direction, target: None, radiance, pdf: PDF, delta: false })
+        Some(LightSample {
+            direction,
+            target: None,
+            radiance,
+            pdf: PDF,
+            delta: false,
+        })
     }
 
     fn is_environment(&self) -> bool {

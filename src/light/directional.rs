@@ -17,26 +17,52 @@ pub struct Directional<C: ColorModel> {
 }
 
 impl<C: ColorModel> Directional<C> {
-    pub(super) fn build(properties: &Properties<'_>, context: &LightContext<'_, C>) -> Result<Self> {
+    pub(super) fn build(
+        properties: &Properties<'_>,
+        context: &LightContext<'_, C>,
+    ) -> Result<Self> {
         let direction = match properties.vector("direction")? {
             Some(_) if properties.has("to_world") => {
-                return Err(properties.error("direction", "direction and to_world exclude each other"));
+                return Err(
+                    properties.error("direction", "direction and to_world exclude each other")
+                );
             }
             Some(direction) => direction.normalize_or_zero(),
-            None => to_world(properties)?.vector(Vec3::Z).as_dvec3().normalize_or_zero(),
+            None => to_world(properties)?
+                .vector(Vec3::Z)
+                .as_dvec3()
+                .normalize_or_zero(),
         };
         if direction == DVec3::ZERO {
             return Err(properties.error("direction", "a direction cannot have length 0"));
         }
-        let irradiance =
-            context.palettes.colors.color(properties, "irradiance", Role::Emission, Color::D65(1.0))?;
-        Ok(Self { irradiance, direction: direction.as_vec3() })
+        let irradiance = context.palettes.colors.color(
+            properties,
+            "irradiance",
+            Role::Emission,
+            Color::D65(1.0),
+        )?;
+        Ok(Self {
+            irradiance,
+            direction: direction.as_vec3(),
+        })
     }
 }
 
 impl<C: ColorModel> Emitter<C> for Directional<C> {
-    fn sample(&self, _from: Vec3, _u: Vec2, wavelengths: &C::Wavelengths) -> Option<LightSample<C::Sample>> {
+    fn sample(
+        &self,
+        _from: Vec3,
+        _u: Vec2,
+        wavelengths: &C::Wavelengths,
+    ) -> Option<LightSample<C::Sample>> {
         let radiance = C::evaluate(&self.irradiance, wavelengths);
-        Some(LightSample { direction: -self.direction, target: None, radiance, pdf: 1.0, delta: true })
+        Some(LightSample {
+            direction: -self.direction,
+            target: None,
+            radiance,
+            pdf: 1.0,
+            delta: true,
+        })
     }
 }

@@ -36,7 +36,12 @@ pub struct LightSample<S> {
 /// What every light does.
 pub trait Emitter<C: ColorModel>: std::fmt::Debug + Send + Sync {
     /// A direction from the point `from` toward the light; `None` where none of its light arrives.
-    fn sample(&self, from: Vec3, u: Vec2, wavelengths: &C::Wavelengths) -> Option<LightSample<C::Sample>>;
+    fn sample(
+        &self,
+        from: Vec3,
+        u: Vec2,
+        wavelengths: &C::Wavelengths,
+    ) -> Option<LightSample<C::Sample>>;
 
     /// Radiance that leaves the light's surface at `at` toward `at.wi`.
     fn surface_radiance(&self, _at: &Interaction<'_>, _wavelengths: &C::Wavelengths) -> C::Sample {
@@ -84,5 +89,6 @@ family! {
 /// The property `to_world`.
 fn to_world(properties: &Properties<'_>) -> Result<Transform> {
     let matrix = properties.transform("to_world")?.unwrap_or(DMat4::IDENTITY);
-    Transform::new(&matrix).ok_or_else(|| properties.error("to_world", "the transform must be affine and invertible"))
+    Transform::new(&matrix)
+        .ok_or_else(|| properties.error("to_world", "the transform must be affine and invertible"))
 }

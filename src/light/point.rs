@@ -15,21 +15,39 @@ pub struct Point<C: ColorModel> {
 }
 
 impl<C: ColorModel> Point<C> {
-    pub(super) fn build(properties: &Properties<'_>, context: &LightContext<'_, C>) -> Result<Self> {
+    pub(super) fn build(
+        properties: &Properties<'_>,
+        context: &LightContext<'_, C>,
+    ) -> Result<Self> {
         let position = match properties.vector("position")? {
             Some(_) if properties.has("to_world") => {
-                return Err(properties.error("position", "position and to_world exclude each other"));
+                return Err(
+                    properties.error("position", "position and to_world exclude each other")
+                );
             }
             Some(position) => position.as_vec3(),
             None => to_world(properties)?.translation(),
         };
-        let intensity = context.palettes.colors.color(properties, "intensity", Role::Emission, Color::D65(1.0))?;
-        Ok(Self { intensity, position })
+        let intensity = context.palettes.colors.color(
+            properties,
+            "intensity",
+            Role::Emission,
+            Color::D65(1.0),
+        )?;
+        Ok(Self {
+            intensity,
+            position,
+        })
     }
 }
 
 impl<C: ColorModel> Emitter<C> for Point<C> {
-    fn sample(&self, from: Vec3, _u: Vec2, wavelengths: &C::Wavelengths) -> Option<LightSample<C::Sample>> {
+    fn sample(
+        &self,
+        from: Vec3,
+        _u: Vec2,
+        wavelengths: &C::Wavelengths,
+    ) -> Option<LightSample<C::Sample>> {
         let way = self.position - from;
         let squared = way.length_squared();
         (squared > 0.0).then(|| LightSample {

@@ -21,13 +21,24 @@ pub struct Diffuse<C: ColorModel> {
 impl<C: ColorModel> Diffuse<C> {
     pub(super) fn build(properties: &Properties<'_>, palettes: &Palettes<C>) -> Result<Self> {
         let default = Color::Grey(0.5);
-        Ok(Self { reflectance: palettes.colors.texture(properties, "reflectance", Role::Reflectance, default)? })
+        Ok(Self {
+            reflectance: palettes.colors.texture(
+                properties,
+                "reflectance",
+                Role::Reflectance,
+                default,
+            )?,
+        })
     }
 
     /// The same grey, in [0, 1], everywhere.
     pub(super) fn grey(palettes: &Palettes<C>, value: f64) -> Self {
         let palette = palettes.colors.with_role(Role::Reflectance);
-        Self { reflectance: palette.uniform(&Color::Grey(value)).expect("a fraction is a reflectance") }
+        Self {
+            reflectance: palette
+                .uniform(&Color::Grey(value))
+                .expect("a fraction is a reflectance"),
+        }
     }
 }
 
@@ -36,7 +47,13 @@ impl<C: ColorModel> Bsdf<C> for Diffuse<C> {
         true
     }
 
-    fn eval(&self, at: &Interaction<'_>, wi: Vec3, wo: Vec3, w: &C::Wavelengths) -> Option<BsdfValue<C::Sample>> {
+    fn eval(
+        &self,
+        at: &Interaction<'_>,
+        wi: Vec3,
+        wo: Vec3,
+        w: &C::Wavelengths,
+    ) -> Option<BsdfValue<C::Sample>> {
         (wi.z > 0.0 && wo.z > 0.0).then(|| BsdfValue {
             value: self.reflectance.eval(at, w) * (FRAC_1_PI * wo.z),
             pdf: warp::cosine_hemisphere_pdf(wo.z),
@@ -54,6 +71,12 @@ impl<C: ColorModel> Bsdf<C> for Diffuse<C> {
         let wo = warp::cosine_hemisphere(u2);
         let pdf = warp::cosine_hemisphere_pdf(wo.z);
         let weight = self.reflectance.eval(at, w);
-        (wi.z > 0.0 && pdf > 0.0 && !weight.is_black()).then_some(BsdfSample { wo, weight, pdf, eta: 1.0, delta: false })
+        (wi.z > 0.0 && pdf > 0.0 && !weight.is_black()).then_some(BsdfSample {
+            wo,
+            weight,
+            pdf,
+            eta: 1.0,
+            delta: false,
+        })
     }
 }

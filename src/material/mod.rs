@@ -75,7 +75,10 @@ family! {
 impl<C: ColorModel> Material<C> {
     /// The material of a shape that names none: grey, or black where the shape gives light.
     pub fn default_of_shape(palettes: &Palettes<C>, gives_light: bool) -> Self {
-        Self::Diffuse(diffuse::Diffuse::grey(palettes, if gives_light { 0.0 } else { 0.5 }))
+        Self::Diffuse(diffuse::Diffuse::grey(
+            palettes,
+            if gives_light { 0.0 } else { 0.5 },
+        ))
     }
 }
 
@@ -88,12 +91,24 @@ fn nested<C: ColorModel>(
     let children = properties.children(Kind::Bsdf);
     if !allowed.contains(&children.len()) {
         let (least, most) = (allowed.start(), allowed.end());
-        let wanted = if least == most { format!("{least}") } else { format!("{least} or {most}") };
+        let wanted = if least == most {
+            format!("{least}")
+        } else {
+            format!("{least} or {most}")
+        };
         let plugin = properties.plugin();
-        return Err(properties
-            .error("", format!("{plugin} needs {wanted} nested bsdf, and has {}", children.len())));
+        return Err(properties.error(
+            "",
+            format!(
+                "{plugin} needs {wanted} nested bsdf, and has {}",
+                children.len()
+            ),
+        ));
     }
-    children.iter().map(|child| Material::build(child, palettes)).collect()
+    children
+        .iter()
+        .map(|child| Material::build(child, palettes))
+        .collect()
 }
 
 #[cfg(test)]

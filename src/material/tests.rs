@@ -11,14 +11,21 @@ use crate::math::{Frame, random, warp};
 
 /// Scene text of each material under test, a member of the family at least once.
 const MATERIALS: &[(&str, &str)] = &[
-    ("diffuse", r#"<bsdf type="diffuse"><rgb name="reflectance" value="1, 0.5, 0"/></bsdf>"#),
-    ("twosided", r#"<bsdf type="twosided"><bsdf type="diffuse"/><bsdf type="diffuse"><float name="reflectance" value="0.9"/></bsdf></bsdf>"#),
+    (
+        "diffuse",
+        r#"<bsdf type="diffuse"><rgb name="reflectance" value="1, 0.5, 0"/></bsdf>"#,
+    ),
+    (
+        "twosided",
+        r#"<bsdf type="twosided"><bsdf type="diffuse"/><bsdf type="diffuse"><float name="reflectance" value="0.9"/></bsdf></bsdf>"#,
+    ),
 ];
 
 fn build(text: &str) -> Material<Rgb> {
     let text = format!(r#"<scene version="3.0.0">{text}</scene>"#);
     let scene = Description::parse(&text, Path::new("test.xml"), &Options::default()).unwrap();
-    let material = Material::build(&scene.root().children(Kind::Bsdf)[0], &Palettes::new(Rgb)).unwrap();
+    let material =
+        Material::build(&scene.root().children(Kind::Bsdf)[0], &Palettes::new(Rgb)).unwrap();
     assert_eq!(scene.unread(), []);
     material
 }
@@ -58,7 +65,10 @@ fn incidences() -> impl Iterator<Item = Vec3> {
 #[test]
 fn every_material_of_the_family_is_tested() {
     for name in Material::<Rgb>::NAMES {
-        assert!(MATERIALS.iter().any(|(n, _)| n == name), "add {name} to the table of materials under test");
+        assert!(
+            MATERIALS.iter().any(|(n, _)| n == name),
+            "add {name} to the table of materials under test"
+        );
     }
 }
 
@@ -72,7 +82,11 @@ fn every_material_reflects_no_more_than_it_receives() {
             for i in 0..n {
                 let (u1, u2) = uniforms(i);
                 if let Some(sample) = material.sample(&interaction(), wi, u1, u2, &()) {
-                    assert!((sample.wo.length() - 1.0).abs() < 1e-4, "{name}: {:?}", sample.wo);
+                    assert!(
+                        (sample.wo.length() - 1.0).abs() < 1e-4,
+                        "{name}: {:?}",
+                        sample.wo
+                    );
                     // Light that is squeezed into a narrower cone by refraction carries more radiance.
                     sum += f64::from(sample.weight.max_value() / sample.eta.powi(2)) / f64::from(n);
                 }
@@ -90,17 +104,34 @@ fn every_material_samples_what_it_evaluates() {
             // Delta lobes have no value to compare: samples that are not delta must agree one by one.
             for i in 0..2000 {
                 let (u1, u2) = uniforms(i);
-                let Some(sample) = material.sample(&interaction(), wi, u1, u2, &()) else { continue };
+                let Some(sample) = material.sample(&interaction(), wi, u1, u2, &()) else {
+                    continue;
+                };
                 if sample.delta {
                     continue;
                 }
-                let value = material.eval(&interaction(), wi, sample.wo, &()).unwrap_or_else(|| {
-                    panic!("{name} at {wi} drew {} and evaluates it to nothing", sample.wo)
-                });
-                assert!((value.pdf / sample.pdf - 1.0).abs() < 1e-2, "{name} {wi} {}: {} {}", sample.wo, value.pdf, sample.pdf);
+                let value = material
+                    .eval(&interaction(), wi, sample.wo, &())
+                    .unwrap_or_else(|| {
+                        panic!(
+                            "{name} at {wi} drew {} and evaluates it to nothing",
+                            sample.wo
+                        )
+                    });
+                assert!(
+                    (value.pdf / sample.pdf - 1.0).abs() < 1e-2,
+                    "{name} {wi} {}: {} {}",
+                    sample.wo,
+                    value.pdf,
+                    sample.pdf
+                );
                 for c in 0..3 {
                     let (a, b) = (value.value[c], sample.weight[c] * sample.pdf);
-                    assert!((a - b).abs() <= 1e-2 * (a.abs() + b.abs()) + 1e-6, "{name} {wi} {}: {a} {b}", sample.wo);
+                    assert!(
+                        (a - b).abs() <= 1e-2 * (a.abs() + b.abs()) + 1e-6,
+                        "{name} {wi} {}: {a} {b}",
+                        sample.wo
+                    );
                 }
             }
         }
@@ -124,7 +155,10 @@ fn every_material_draws_directions_with_the_density_that_it_says() {
             };
             for i in 0..n {
                 let (u1, u2) = uniforms(i);
-                if let Some(sample) = material.sample(&interaction(), wi, u1, u2, &()).filter(|s| !s.delta) {
+                if let Some(sample) = material
+                    .sample(&interaction(), wi, u1, u2, &())
+                    .filter(|s| !s.delta)
+                {
                     observed[cell(sample.wo)] += 1.0;
                 }
             }
@@ -145,7 +179,10 @@ fn every_material_draws_directions_with_the_density_that_it_says() {
                 cells += 1.0;
             }
             // χ² of k cells has mean k and deviation √2k; 5 deviations and 2 % for the integration.
-            assert!(chi2 < cells * 1.3 + 5.0 * f64::sqrt(2.0 * cells) + 10.0, "{name} {wi}: χ² {chi2} over {cells}");
+            assert!(
+                chi2 < cells * 1.3 + 5.0 * f64::sqrt(2.0 * cells) + 10.0,
+                "{name} {wi}: χ² {chi2} over {cells}"
+            );
         }
     }
 }
@@ -161,7 +198,11 @@ fn reflection_is_reciprocal() {
             if a.z * b.z <= 0.01 {
                 continue; // transmission scales with the index of refraction
             }
-            let f = |wi, wo: Vec3| material.eval(&interaction(), wi, wo, &()).map_or(0.0, |v| v.value[0] / wo.z.abs());
+            let f = |wi, wo: Vec3| {
+                material
+                    .eval(&interaction(), wi, wo, &())
+                    .map_or(0.0, |v| v.value[0] / wo.z.abs())
+            };
             let (x, y) = (f(a, b), f(b, a));
             assert!((x - y).abs() <= 1e-3 * (x + y) + 1e-6, "{name}: {x} {y}");
         }

@@ -19,9 +19,14 @@ pub struct TwoSided<C: ColorModel> {
 
 impl<C: ColorModel> TwoSided<C> {
     pub(super) fn build(properties: &Properties<'_>, palettes: &Palettes<C>) -> Result<Self> {
-        let mut sides = nested(properties, palettes, 1..=2)?.into_iter().map(Box::new);
+        let mut sides = nested(properties, palettes, 1..=2)?
+            .into_iter()
+            .map(Box::new);
         let front = sides.next().expect("there is at least one");
-        Ok(Self { front, back: sides.next() })
+        Ok(Self {
+            front,
+            back: sides.next(),
+        })
     }
 
     /// The material on the side of `wi`, and the factor that brings it to the front.
@@ -41,7 +46,13 @@ impl<C: ColorModel> Bsdf<C> for TwoSided<C> {
         self.front.is_smooth() || self.back.as_ref().is_some_and(|b| b.is_smooth())
     }
 
-    fn eval(&self, at: &Interaction<'_>, wi: Vec3, wo: Vec3, w: &C::Wavelengths) -> Option<BsdfValue<C::Sample>> {
+    fn eval(
+        &self,
+        at: &Interaction<'_>,
+        wi: Vec3,
+        wo: Vec3,
+        w: &C::Wavelengths,
+    ) -> Option<BsdfValue<C::Sample>> {
         let (material, flip) = self.side(wi);
         material.eval(at, wi * flip, wo * flip, w)
     }
@@ -56,6 +67,9 @@ impl<C: ColorModel> Bsdf<C> for TwoSided<C> {
     ) -> Option<BsdfSample<C::Sample>> {
         let (material, flip) = self.side(wi);
         let sample = material.sample(at, wi * flip, u1, u2, w)?;
-        Some(BsdfSample { wo: sample.wo * flip, ..sample })
+        Some(BsdfSample {
+            wo: sample.wo * flip,
+            ..sample
+        })
     }
 }

@@ -53,7 +53,11 @@ impl Discrete {
         }
         let (low, high) = (self.cumulative[index], self.cumulative[index + 1]);
         let rest = (((target - low) / (high - low)) as f32).clamp(0.0, 1f32.next_down());
-        Drawn { index, probability: (high - low) / self.total(), rest }
+        Drawn {
+            index,
+            probability: (high - low) / self.total(),
+            rest,
+        }
     }
 }
 
@@ -68,20 +72,36 @@ pub struct Grid {
 impl Grid {
     /// From `width` columns of weights, row by row; `None` where no weight is positive.
     pub fn new(width: usize, weights: &[f64]) -> Option<Self> {
-        let columns: Vec<_> =
-            weights.chunks_exact(width).map(|row| Discrete::new(row.iter().copied())).collect();
-        let rows = Discrete::new(columns.iter().map(|c| c.as_ref().map_or(0.0, Discrete::total)))?;
-        Some(Self { width, rows, columns })
+        let columns: Vec<_> = weights
+            .chunks_exact(width)
+            .map(|row| Discrete::new(row.iter().copied()))
+            .collect();
+        let rows = Discrete::new(
+            columns
+                .iter()
+                .map(|c| c.as_ref().map_or(0.0, Discrete::total)),
+        )?;
+        Some(Self {
+            width,
+            rows,
+            columns,
+        })
     }
 
     /// A point of the unit square, and its density.
     pub fn sample(&self, u: Vec2) -> (Vec2, f32) {
         let row = self.rows.sample(u.y);
-        let columns = self.columns[row.index].as_ref().expect("a drawn row has weight");
+        let columns = self.columns[row.index]
+            .as_ref()
+            .expect("a drawn row has weight");
         let column = columns.sample(u.x);
         let cells = Vec2::new(self.width as f32, self.columns.len() as f32);
-        let p = Vec2::new(column.index as f32 + column.rest, row.index as f32 + row.rest) / cells;
-        let density = row.probability * column.probability * (self.width * self.columns.len()) as f64;
+        let p = Vec2::new(
+            column.index as f32 + column.rest,
+            row.index as f32 + row.rest,
+        ) / cells;
+        let density =
+            row.probability * column.probability * (self.width * self.columns.len()) as f64;
         (p.min(Vec2::splat(1f32.next_down())), density as f32)
     }
 
@@ -105,7 +125,9 @@ mod tests {
     fn indices_come_in_proportion_to_their_weights() {
         let d = Discrete::new([0.0, 1.0, 0.0, 3.0, 0.0]).unwrap();
         let n = 40_000;
-        let threes = (0..n).filter(|&i| d.sample(random::unit(random::bits(1, i))).index == 3).count();
+        let threes = (0..n)
+            .filter(|&i| d.sample(random::unit(random::bits(1, i))).index == 3)
+            .count();
         assert!((threes as f64 / f64::from(n) - 0.75).abs() < 0.01);
         for u in [0.0, 0.25, 0.249_999, 1f32.next_down()] {
             assert!(d.probability(d.sample(u).index) > 0.0, "{u}");
@@ -121,7 +143,10 @@ mod tests {
         let n = 20_000;
         let mean: f64 = (0..n)
             .map(|i| {
-                let u = Vec2::new(random::unit(random::bits(5, i)), random::unit(random::bits(6, i)));
+                let u = Vec2::new(
+                    random::unit(random::bits(5, i)),
+                    random::unit(random::bits(6, i)),
+                );
                 let (p, pdf) = grid.sample(u);
                 assert!((grid.pdf(p) - pdf).abs() < 1e-4 * pdf);
                 1.0 / f64::from(pdf)

@@ -31,7 +31,15 @@ impl Frame {
     /// where `tangent` is parallel to `n`, zero or not finite.
     pub fn along(n: Vec3, tangent: Vec3) -> Self {
         let s = (tangent - n * n.dot(tangent)).normalize_or_zero();
-        if s == Vec3::ZERO || !s.is_finite() { Self::around(n) } else { Self { s, t: n.cross(s), n } }
+        if s == Vec3::ZERO || !s.is_finite() {
+            Self::around(n)
+        } else {
+            Self {
+                s,
+                t: n.cross(s),
+                n,
+            }
+        }
     }
 
     /// A world direction in this frame.
@@ -60,7 +68,11 @@ mod tests {
                 random::unit(random::bits(1, i)),
                 random::unit(random::bits(2, i)),
             ));
-            for frame in [Frame::around(n), Frame::along(n, Vec3::X), Frame::along(n, n)] {
+            for frame in [
+                Frame::around(n),
+                Frame::along(n, Vec3::X),
+                Frame::along(n, n),
+            ] {
                 assert!((frame.s.cross(frame.t) - frame.n).length() < 1e-5);
                 let v = Vec3::new(0.3, -0.5, 0.8);
                 assert!((frame.to_world(frame.to_local(v)) - v).length() < 1e-5);

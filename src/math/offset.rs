@@ -16,12 +16,20 @@ pub const fn gamma(n: u32) -> f32 {
 #[inline]
 pub fn offset(position: Vec3, error: Vec3, normal: Vec3, direction: Vec3) -> Vec3 {
     let distance = normal.abs().dot(error);
-    let shift = if direction.dot(normal) < 0.0 { -distance * normal } else { distance * normal };
+    let shift = if direction.dot(normal) < 0.0 {
+        -distance * normal
+    } else {
+        distance * normal
+    };
     let moved = position + shift;
     let outward = |p: f32, s: f32| match s {
         s if s > 0.0 => p.next_up(),
         s if s < 0.0 => p.next_down(),
         _ => p,
     };
-    Vec3::new(outward(moved.x, shift.x), outward(moved.y, shift.y), outward(moved.z, shift.z))
+    Vec3::new(
+        outward(moved.x, shift.x),
+        outward(moved.y, shift.y),
+        outward(moved.z, shift.z),
+    )
 }

@@ -86,7 +86,10 @@ mod tests {
         // Standard deviations: 1/√12 for the mean, 1/12 for the products, each over √n.
         let scale = f64::from(n).sqrt();
         assert!(sum[0].abs() / scale < 4.0 * 0.289, "{sum:?}");
-        assert!(sum[1].abs() / scale < 4.0 / 12.0 && sum[2].abs() / scale < 4.0 / 12.0, "{sum:?}");
+        assert!(
+            sum[1].abs() / scale < 4.0 / 12.0 && sum[2].abs() / scale < 4.0 / 12.0,
+            "{sum:?}"
+        );
     }
 
     #[test]

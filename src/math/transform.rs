@@ -11,7 +11,10 @@ pub struct Transform {
 
 impl Transform {
     /// Leaves everything in its place.
-    pub const IDENTITY: Self = Self { forward: Affine3::IDENTITY, inverse: Affine3::IDENTITY };
+    pub const IDENTITY: Self = Self {
+        forward: Affine3::IDENTITY,
+        inverse: Affine3::IDENTITY,
+    };
 
     /// From a 4×4 matrix, inverted in double precision; `None` where the matrix is not affine, not
     /// finite or singular (a column that the others span to within 10⁻¹² of its length).
@@ -60,7 +63,10 @@ impl Transform {
     /// The way back.
     #[inline]
     pub fn inverse(&self) -> Self {
-        Self { forward: self.inverse, inverse: self.forward }
+        Self {
+            forward: self.inverse,
+            inverse: self.forward,
+        }
     }
 
     /// Whether it turns right hands into left ones.
@@ -74,7 +80,8 @@ impl Transform {
         const GAMMA_3: f32 = 3.0 * (f32::EPSILON * 0.5) / (1.0 - 3.0 * (f32::EPSILON * 0.5));
         let m = self.forward.matrix3;
         let spread = Mat3::from_cols(m.x_axis.abs(), m.y_axis.abs(), m.z_axis.abs());
-        spread * (p.abs() * GAMMA_3 + error * (1.0 + GAMMA_3)) + self.forward.translation.abs() * GAMMA_3
+        spread * (p.abs() * GAMMA_3 + error * (1.0 + GAMMA_3))
+            + self.forward.translation.abs() * GAMMA_3
     }
 }
 
@@ -96,7 +103,10 @@ mod tests {
 
     #[test]
     fn flat_and_infinite_matrices_are_refused_and_small_ones_are_not() {
-        assert_eq!(Transform::new(&DMat4::from_scale(DVec3::new(1.0, 1.0, 0.0))), None);
+        assert_eq!(
+            Transform::new(&DMat4::from_scale(DVec3::new(1.0, 1.0, 0.0))),
+            None
+        );
         assert_eq!(Transform::new(&(DMat4::IDENTITY * f64::INFINITY)), None);
         assert!(Transform::new(&DMat4::from_scale(DVec3::splat(1e-9))).is_some());
         assert!(Transform::new(&DMat4::from_scale(DVec3::new(1.0, 1.0, 1e-9))).is_some());

@@ -90,7 +90,10 @@ mod tests {
         near(mean(|u| f64::from(uniform_sphere(u).z)), 0.0);
         near(mean(|u| f64::from(uniform_sphere(u).z.powi(2))), 1.0 / 3.0);
         near(mean(|u| f64::from(uniform_cone(u, 0.3).z)), 0.85);
-        near(mean(|u| f64::from(concentric_disk(u).length_squared())), 0.5);
+        near(
+            mean(|u| f64::from(concentric_disk(u).length_squared())),
+            0.5,
+        );
         near(mean(|u| f64::from(uniform_triangle(u).x)), 1.0 / 3.0);
         near(mean(|u| f64::from(uniform_triangle(u).y)), 1.0 / 3.0);
     }
@@ -98,7 +101,11 @@ mod tests {
     #[test]
     fn warped_directions_have_unit_length() {
         for u in [Vec2::ZERO, Vec2::splat(0.5), Vec2::new(0.999_999_94, 0.3)] {
-            for d in [cosine_hemisphere(u), uniform_sphere(u), uniform_cone(u, 1e-6)] {
+            for d in [
+                cosine_hemisphere(u),
+                uniform_sphere(u),
+                uniform_cone(u, 1e-6),
+            ] {
                 assert!((d.length() - 1.0).abs() < 1e-5, "{u} {d}");
             }
         }

@@ -8,7 +8,7 @@
 //! with the turned faces; `face_normals` drops the vertex normals ([`Mesh::drop_normals`]);
 //! `flip_normals` turns geometric and vertex normals over ([`Mesh::flip_normals`]).
 
-pub mod generate;
+mod generate;
 mod gltf;
 mod normals;
 mod obj;

@@ -16,7 +16,9 @@ pub struct Independent {
 impl Independent {
     pub(super) fn build(properties: &Properties<'_>, _context: &()) -> Result<Self> {
         properties.ignore("seed"); // the render's seed is the command line's
-        Ok(Self { count: sample_count(properties)? })
+        Ok(Self {
+            count: sample_count(properties)?,
+        })
     }
 }
 
@@ -37,6 +39,9 @@ impl PointSet for Independent {
     #[inline]
     fn get_2d(&self, key: u64, index: u32, dimension: u32) -> Vec2 {
         let key = random::key(key, u64::from(index));
-        Vec2::new(random::unit(random::bits(key, dimension)), random::unit(random::bits(key, dimension + 1)))
+        Vec2::new(
+            random::unit(random::bits(key, dimension)),
+            random::unit(random::bits(key, dimension + 1)),
+        )
     }
 }

@@ -50,7 +50,12 @@ fn sample_count(properties: &Properties<'_>) -> Result<u32> {
     u32::try_from(count)
         .ok()
         .filter(|c| (1..=MAX_SAMPLES).contains(c))
-        .ok_or_else(|| properties.error("sample_count", format!("{count} samples; 1 to {MAX_SAMPLES} are possible")))
+        .ok_or_else(|| {
+            properties.error(
+                "sample_count",
+                format!("{count} samples; 1 to {MAX_SAMPLES} are possible"),
+            )
+        })
 }
 
 /// The most samples a pixel can have.
@@ -68,7 +73,11 @@ impl Stream {
     /// Sample `index` of the pixel (x, y) of the full film, under `seed`.
     pub fn new(seed: u64, x: u32, y: u32, index: u32) -> Self {
         let pixel = u64::from(x) | u64::from(y) << 32;
-        Self { key: random::key(random::key(0, seed), pixel), index, dimension: 0 }
+        Self {
+            key: random::key(random::key(0, seed), pixel),
+            index,
+            dimension: 0,
+        }
     }
 
     /// Goes to a dimension, such as the first of a bounce.
@@ -112,15 +121,25 @@ mod tests {
     #[test]
     fn every_sampler_fills_the_unit_square_evenly_and_repeats_itself() {
         for (name, sampler) in every_sampler(1000) {
-            assert!(sampler.sample_count() >= 1000 && sampler.sample_count() % sampler.set_size() == 0);
+            assert!(
+                sampler.sample_count() >= 1000 && sampler.sample_count() % sampler.set_size() == 0
+            );
             for dimension in [0, 5, 40] {
                 let n = sampler.sample_count();
                 let points: Vec<Vec2> = (0..n).map(|i| sampler.get_2d(9, i, dimension)).collect();
-                assert!(points.iter().all(|p| (0.0..1.0).contains(&p.x) && (0.0..1.0).contains(&p.y)), "{name}");
+                assert!(
+                    points
+                        .iter()
+                        .all(|p| (0.0..1.0).contains(&p.x) && (0.0..1.0).contains(&p.y)),
+                    "{name}"
+                );
                 let mean = points.iter().sum::<Vec2>() / n as f32;
                 // Five standard deviations of independent points.
                 let tolerance = 5.0 * 0.289 / (n as f32).sqrt();
-                assert!((mean - Vec2::splat(0.5)).abs().max_element() < tolerance, "{name}: {mean}");
+                assert!(
+                    (mean - Vec2::splat(0.5)).abs().max_element() < tolerance,
+                    "{name}: {mean}"
+                );
                 let again: Vec<Vec2> = (0..n).map(|i| sampler.get_2d(9, i, dimension)).collect();
                 assert_eq!(points, again, "{name}");
                 let other: Vec<Vec2> = (0..n).map(|i| sampler.get_2d(10, i, dimension)).collect();
@@ -133,14 +152,21 @@ mod tests {
     fn prefixes_of_every_sampler_are_unbiased() {
         for (name, sampler) in every_sampler(64) {
             let keys = 4000;
-            let sum: f64 = (0..keys).map(|k| f64::from(sampler.get_1d(random::key(3, k), 0, 2))).sum();
-            assert!((sum / keys as f64 - 0.5).abs() < 5.0 * 0.289 / (keys as f64).sqrt(), "{name}");
+            let sum: f64 = (0..keys)
+                .map(|k| f64::from(sampler.get_1d(random::key(3, k), 0, 2)))
+                .sum();
+            assert!(
+                (sum / keys as f64 - 0.5).abs() < 5.0 * 0.289 / (keys as f64).sqrt(),
+                "{name}"
+            );
         }
     }
 
     #[test]
     fn stratified_points_lie_one_in_each_stratum() {
-        let (_, sampler) = every_sampler(64).find(|(name, _)| *name == "stratified").unwrap();
+        let (_, sampler) = every_sampler(64)
+            .find(|(name, _)| *name == "stratified")
+            .unwrap();
         let (mut cells, mut intervals) = ([0; 64], [0; 64]);
         for i in 64..128 {
             let p = sampler.get_2d(4, i, 6) * 8.0;

@@ -23,7 +23,10 @@ impl Stratified {
         properties.ignore("seed"); // the render's seed is the command line's
         let count = sample_count(properties)?;
         let side = count.isqrt() + u32::from(count.isqrt().pow(2) < count);
-        Ok(Self { side, jitter: properties.boolean("jitter")?.unwrap_or(true) })
+        Ok(Self {
+            side,
+            jitter: properties.boolean("jitter")?.unwrap_or(true),
+        })
     }
 
     /// The set's key for a dimension, and the point's place in the set's permutation of the strata.
@@ -36,7 +39,11 @@ impl Stratified {
 
     #[inline]
     fn jitter(&self, key: u64, stratum: u32, axis: u32) -> f32 {
-        if self.jitter { random::unit(random::bits(random::key(key, u64::from(stratum)), axis)) } else { 0.5 }
+        if self.jitter {
+            random::unit(random::bits(random::key(key, u64::from(stratum)), axis))
+        } else {
+            0.5
+        }
     }
 }
 

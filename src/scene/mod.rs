@@ -67,7 +67,12 @@ impl<C: ColorModel> Scene<C> {
     }
 
     /// Whether anything lies on each ray.
-    pub fn occluded(&self, rays: impl Iterator<Item = Ray>, blocked: &mut Vec<bool>, counts: &mut Counts) {
+    pub fn occluded(
+        &self,
+        rays: impl Iterator<Item = Ray>,
+        blocked: &mut Vec<bool>,
+        counts: &mut Counts,
+    ) {
         self.tracer.occluded(rays, blocked, counts);
     }
 
@@ -83,7 +88,9 @@ impl<C: ColorModel> Scene<C> {
 
     /// The light that a point belongs to.
     fn light_at(&self, at: &Interaction<'_>) -> Option<&Light<C>> {
-        self.surfacing[at.shape as usize].light.map(|id| self.light(id))
+        self.surfacing[at.shape as usize]
+            .light
+            .map(|id| self.light(id))
     }
 
     fn light(&self, id: LightId) -> &Light<C> {
@@ -97,16 +104,32 @@ impl<C: ColorModel> Scene<C> {
 
     /// A direction toward one of the lights from `from`; `u1` chooses the light. The density includes
     /// the choice.
-    pub fn sample_light(&self, from: Vec3, u1: f32, u2: Vec2, w: &C::Wavelengths) -> Option<LightSample<C::Sample>> {
+    pub fn sample_light(
+        &self,
+        from: Vec3,
+        u1: f32,
+        u2: Vec2,
+        w: &C::Wavelengths,
+    ) -> Option<LightSample<C::Sample>> {
         let chosen = (u1 * self.lights.len() as f32) as usize;
-        let light = self.lights.get(chosen.min(self.lights.len().checked_sub(1)?))?;
+        let light = self
+            .lights
+            .get(chosen.min(self.lights.len().checked_sub(1)?))?;
         let sample = light.sample(from, u2, w)?;
-        Some(LightSample { pdf: sample.pdf * self.choice(), ..sample })
+        Some(LightSample {
+            pdf: sample.pdf * self.choice(),
+            ..sample
+        })
     }
 
     /// Radiance that the surface at `at` emits toward `at.wi`, and the density with which
     /// [`Scene::sample_light`] draws `at` from `from`; `None` where nothing is emitted.
-    pub fn emitted(&self, at: &Interaction<'_>, from: Vec3, w: &C::Wavelengths) -> Option<(C::Sample, f32)> {
+    pub fn emitted(
+        &self,
+        at: &Interaction<'_>,
+        from: Vec3,
+        w: &C::Wavelengths,
+    ) -> Option<(C::Sample, f32)> {
         let light = self.light_at(at)?;
         let radiance = light.surface_radiance(at, w);
         (!radiance.is_black()).then(|| (radiance, light.surface_pdf(from, at) * self.choice()))

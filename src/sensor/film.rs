@@ -32,10 +32,18 @@ impl Window {
     /// Grown by `border` pixels to each side, but not beyond `limit`.
     #[must_use]
     pub fn grown(&self, border: u32, limit: &Self) -> Self {
-        let (x, y) = (self.x.saturating_sub(border).max(limit.x), self.y.saturating_sub(border).max(limit.y));
+        let (x, y) = (
+            self.x.saturating_sub(border).max(limit.x),
+            self.y.saturating_sub(border).max(limit.y),
+        );
         let right = (self.x + self.width + border).min(limit.x + limit.width);
         let bottom = (self.y + self.height + border).min(limit.y + limit.height);
-        Self { x, y, width: right.saturating_sub(x), height: bottom.saturating_sub(y) }
+        Self {
+            x,
+            y,
+            width: right.saturating_sub(x),
+            height: bottom.saturating_sub(y),
+        }
     }
 }
 
@@ -69,8 +77,19 @@ impl Default for Film {
     /// Mitsuba's: 768 × 576.
     fn default() -> Self {
         let (width, height) = (768, 576);
-        let crop = Window { x: 0, y: 0, width, height };
-        Self { width, height, crop, pixel_format: PixelFormat::Rgb, filter: Filter::default() }
+        let crop = Window {
+            x: 0,
+            y: 0,
+            width,
+            height,
+        };
+        Self {
+            width,
+            height,
+            crop,
+            pixel_format: PixelFormat::Rgb,
+            filter: Filter::default(),
+        }
     }
 }
 
@@ -87,19 +106,32 @@ impl Film {
 
     /// The whole film.
     pub fn full(&self) -> Window {
-        Window { x: 0, y: 0, width: self.width, height: self.height }
+        Window {
+            x: 0,
+            y: 0,
+            width: self.width,
+            height: self.height,
+        }
     }
 
     /// From the film inside a sensor.
     pub fn build(properties: &Properties<'_>) -> Result<Self> {
         const NAMES: &[&str] = &["hdrfilm"];
         if properties.plugin() != NAMES[0] {
-            return Err(family::unknown(properties, "film", properties.plugin(), NAMES));
+            return Err(family::unknown(
+                properties,
+                "film",
+                properties.plugin(),
+                NAMES,
+            ));
         }
         let side = |name: &'static str, default: i64, least: i64| -> Result<u32> {
             let n = properties.integer(name)?.unwrap_or(default);
             if !(least..=MAX_SIDE).contains(&n) {
-                return Err(properties.error(name, format!("{n} pixels; {least} to {MAX_SIDE} are possible")));
+                return Err(properties.error(
+                    name,
+                    format!("{n} pixels; {least} to {MAX_SIDE} are possible"),
+                ));
             }
             Ok(n as u32)
         };
@@ -110,36 +142,63 @@ impl Film {
             width: side("crop_width", i64::from(width), 1)?,
             height: side("crop_height", i64::from(height), 1)?,
         };
-        let full = Window { x: 0, y: 0, width, height };
+        let full = Window {
+            x: 0,
+            y: 0,
+            width,
+            height,
+        };
         if !full.contains(&crop) {
             let message = format!(
                 "the crop of {} × {} at ({}, {}) leaves the film of {width} × {height}",
                 crop.width, crop.height, crop.x, crop.y
             );
-            let name = if properties.has("crop_width") { "crop_width" } else { "crop_offset_x" };
+            let name = if properties.has("crop_width") {
+                "crop_width"
+            } else {
+                "crop_offset_x"
+            };
             return Err(properties.error(name, message));
         }
         if u64::from(crop.width) * u64::from(crop.height) > MAX_PIXELS {
-            let message = format!("{} × {} pixels are too many to hold", crop.width, crop.height);
-            return Err(properties.error("width", message).help("render it in crops"));
+            let message = format!(
+                "{} × {} pixels are too many to hold",
+                crop.width, crop.height
+            );
+            return Err(properties
+                .error("width", message)
+                .help("render it in crops"));
         }
         let pixel_format = match properties.string("pixel_format")?.unwrap_or("rgb") {
             "rgb" => PixelFormat::Rgb,
             "rgba" => PixelFormat::Rgba,
             "luminance" => PixelFormat::Luminance,
             other => {
-                let error = properties.error("pixel_format", format!("unknown pixel format \"{other}\""));
+                let error =
+                    properties.error("pixel_format", format!("unknown pixel format \"{other}\""));
                 return Err(error.help("there are rgb, rgba and luminance"));
             }
         };
         // How Mitsuba writes its file; what Étendue writes follows from the output's name.
-        for name in ["file_format", "component_format", "banner", "compensate", "sample_border"] {
+        for name in [
+            "file_format",
+            "component_format",
+            "banner",
+            "compensate",
+            "sample_border",
+        ] {
             properties.ignore(name);
         }
         let filter = match properties.children(Kind::Filter).first() {
             Some(child) => Filter::build(child, &())?,
             None => Filter::default(),
         };
-        Ok(Self { width, height, crop, pixel_format, filter })
+        Ok(Self {
+            width,
+            height,
+            crop,
+            pixel_format,
+            filter,
+        })
     }
 }

@@ -49,14 +49,20 @@ impl Mount {
     fn build(properties: &Properties<'_>) -> Result<Self> {
         let matrix = properties.transform("to_world")?.unwrap_or(DMat4::IDENTITY);
         let Some(to_world) = Transform::new(&matrix) else {
-            return Err(properties.error("to_world", "the sensor's transform must be affine and invertible"));
+            return Err(properties.error(
+                "to_world",
+                "the sensor's transform must be affine and invertible",
+            ));
         };
         let near = properties.float("near_clip")?.unwrap_or(1e-2);
         let far = properties.float("far_clip")?.unwrap_or(1e4);
-        if !(near > 0.0) {
-            return Err(properties.error("near_clip", format!("near_clip must be positive, and {near} is not")));
+        if near <= 0.0 {
+            return Err(properties.error(
+                "near_clip",
+                format!("near_clip must be positive, and {near} is not"),
+            ));
         }
-        if !(far > near) {
+        if far <= near {
             let message = format!("far_clip ({far}) must be greater than near_clip ({near})");
             return Err(properties.error("far_clip", message));
         }
@@ -66,7 +72,12 @@ impl Mount {
             let message = format!("shutter_close ({close}) lies before shutter_open ({open})");
             return Err(properties.error("shutter_close", message));
         }
-        Ok(Self { to_world, near: near as f32, far: far as f32, shutter: (open as f32, close as f32) })
+        Ok(Self {
+            to_world,
+            near: near as f32,
+            far: far as f32,
+            shutter: (open as f32, close as f32),
+        })
     }
 
     fn world_to_camera(&self) -> Mat4 {
@@ -80,6 +91,11 @@ impl Mount {
         // Through the linear part: the difference of two far points would cancel.
         let way = self.to_world.vector(end - start);
         let length = way.length();
-        Ray { origin, direction: way / length, t_max: length, time }
+        Ray {
+            origin,
+            direction: way / length,
+            t_max: length,
+            time,
+        }
     }
 }

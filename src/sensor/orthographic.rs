@@ -19,14 +19,18 @@ pub struct Orthographic {
 impl Orthographic {
     pub(super) fn build(properties: &Properties<'_>, film: &Film) -> Result<Self> {
         let half = Vec2::new(1.0, 1.0 / film.aspect() as f32);
-        Ok(Self { mount: Mount::build(properties)?, half })
+        Ok(Self {
+            mount: Mount::build(properties)?,
+            half,
+        })
     }
 }
 
 impl Camera for Orthographic {
     fn ray(&self, film: Vec2, _lens: Vec2, time: f32) -> Ray {
         let p = (Vec2::ONE - 2.0 * film) * self.half;
-        self.mount.ray(p.extend(self.mount.near), p.extend(self.mount.far), time)
+        self.mount
+            .ray(p.extend(self.mount.near), p.extend(self.mount.far), time)
     }
 
     fn world_to_camera(&self) -> Mat4 {

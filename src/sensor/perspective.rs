@@ -30,25 +30,44 @@ fn tangent_x(properties: &Properties<'_>, aspect: f64) -> Result<f64> {
         let length = text.trim().trim_end_matches("mm").trim().parse::<f64>();
         return match length {
             Ok(f) if f > 0.0 && f.is_finite() => Ok(HALF_DIAGONAL / f / diagonal),
-            _ => Err(properties.error("focal_length", format!("\"{text}\" is not a focal length")).help("write it as 50mm")),
+            _ => Err(properties
+                .error("focal_length", format!("\"{text}\" is not a focal length"))
+                .help("write it as 50mm")),
         };
     };
     if properties.has("focal_length") {
         return Err(properties.error("focal_length", "fov and focal_length exclude each other"));
     }
     if !(fov > 0.0 && fov < 180.0) {
-        return Err(properties.error("fov", format!("a field of view of {fov}° is not between 0° and 180°")));
+        return Err(properties.error(
+            "fov",
+            format!("a field of view of {fov}° is not between 0° and 180°"),
+        ));
     }
     let tangent = (fov.to_radians() / 2.0).tan();
     Ok(match properties.string("fov_axis")?.unwrap_or("x") {
         "x" => tangent,
         "y" => tangent * aspect,
         "diagonal" => tangent / diagonal,
-        "smaller" => if aspect > 1.0 { tangent * aspect } else { tangent },
-        "larger" => if aspect > 1.0 { tangent } else { tangent * aspect },
+        "smaller" => {
+            if aspect > 1.0 {
+                tangent * aspect
+            } else {
+                tangent
+            }
+        }
+        "larger" => {
+            if aspect > 1.0 {
+                tangent
+            } else {
+                tangent * aspect
+            }
+        }
         other => {
             let error = properties.error("fov_axis", format!("unknown fov_axis \"{other}\""));
-            return Err(error.suggest(other, ["diagonal", "smaller", "larger"]).help("there are x, y, diagonal, smaller and larger"));
+            return Err(error
+                .suggest(other, ["diagonal", "smaller", "larger"])
+                .help("there are x, y, diagonal, smaller and larger"));
         }
     })
 }
@@ -60,7 +79,10 @@ impl Perspective {
         Ok(Self {
             mount: Mount::build(properties)?,
             half: Vec2::new(tangent as f32, (tangent / film.aspect()) as f32),
-            principal_point: Vec2::new(shift("principal_point_offset_x")?, shift("principal_point_offset_y")?),
+            principal_point: Vec2::new(
+                shift("principal_point_offset_x")?,
+                shift("principal_point_offset_y")?,
+            ),
         })
     }
 }
@@ -69,7 +91,8 @@ impl Camera for Perspective {
     fn ray(&self, film: Vec2, _lens: Vec2, time: f32) -> Ray {
         let p = (Vec2::ONE - 2.0 * (film - self.principal_point)) * self.half;
         let way = p.extend(1.0);
-        self.mount.ray(way * self.mount.near, way * self.mount.far, time)
+        self.mount
+            .ray(way * self.mount.near, way * self.mount.far, time)
     }
 
     fn world_to_camera(&self) -> Mat4 {
@@ -82,7 +105,12 @@ impl Camera for Perspective {
         Mat4::from_cols(
             Vec4::new(-1.0 / self.half.x, 0.0, 0.0, 0.0),
             Vec4::new(0.0, 1.0 / self.half.y, 0.0, 0.0),
-            Vec4::new(2.0 * self.principal_point.x, -2.0 * self.principal_point.y, depth, 1.0),
+            Vec4::new(
+                2.0 * self.principal_point.x,
+                -2.0 * self.principal_point.y,
+                depth,
+                1.0,
+            ),
             Vec4::new(0.0, 0.0, -near * depth, 0.0),
         )
     }
@@ -95,19 +123,25 @@ impl Camera for Perspective {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::Vec3;
     use crate::description::{Description, Kind, Options};
+    use glam::Vec3;
     use std::path::Path;
 
     fn camera(inside: &str, film: &Film) -> Result<Perspective> {
-        let text = format!(r#"<scene version="3.0.0"><sensor type="perspective">{inside}</sensor></scene>"#);
+        let text = format!(
+            r#"<scene version="3.0.0"><sensor type="perspective">{inside}</sensor></scene>"#
+        );
         let scene = Description::parse(&text, Path::new("test.xml"), &Options::default()).unwrap();
         Perspective::build(&scene.root().children(Kind::Sensor)[0], film)
     }
 
     #[test]
     fn the_field_of_view_lies_along_the_axis_that_is_named() {
-        let film = Film { width: 200, height: 100, ..Film::default() };
+        let film = Film {
+            width: 200,
+            height: 100,
+            ..Film::default()
+        };
         let half = (15f32).to_radians().tan();
         let cases = [
             ("x", half, half / 2.0),
@@ -117,16 +151,26 @@ mod tests {
             ("diagonal", half * 0.8f32.sqrt(), half * 0.2f32.sqrt()),
         ];
         for (axis, x, y) in cases {
-            let inside = format!(r#"<float name="fov" value="30"/><string name="fov_axis" value="{axis}"/>"#);
+            let inside = format!(
+                r#"<float name="fov" value="30"/><string name="fov_axis" value="{axis}"/>"#
+            );
             let camera = camera(&inside, &film).unwrap();
-            assert!((camera.half - Vec2::new(x, y)).length() < 1e-6, "{axis}: {}", camera.half);
+            assert!(
+                (camera.half - Vec2::new(x, y)).length() < 1e-6,
+                "{axis}: {}",
+                camera.half
+            );
         }
         assert!(camera(r#"<float name="fov" value="180"/>"#, &film).is_err());
     }
 
     #[test]
     fn the_projection_takes_a_ray_s_points_to_its_place_on_the_film() {
-        let film = Film { width: 200, height: 100, ..Film::default() };
+        let film = Film {
+            width: 200,
+            height: 100,
+            ..Film::default()
+        };
         let inside = r#"<transform name="to_world"><lookat origin="1,2,3" target="4,0,1" up="0,0,1"/></transform>"#;
         let camera = camera(inside, &film).unwrap();
         let place = Vec2::new(0.8, 0.3);

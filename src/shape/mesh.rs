@@ -4,19 +4,18 @@ use std::sync::OnceLock;
 
 use glam::{Vec2, Vec3};
 
-use super::{Bounds, Geometry, Surface, SurfaceSample, area_to_solid_angle, to_world};
+use super::{Bounds, Geometry, Shape, Surface, SurfaceSample, area_to_solid_angle, to_world};
 use crate::description::Properties;
 use crate::error::Result;
 use crate::interaction::{Hit, Interaction, Ray};
 use crate::math::distribution::Discrete;
 use crate::math::{Frame, offset, warp};
-use crate::mesh::Mesh;
+use crate::mesh::{Mesh, ReadOptions, read};
 
 /// A mesh in world space.
 #[derive(Debug)]
 pub struct TriangleMesh {
     mesh: Mesh,
-    flip_normals: bool,
     /// Triangles by area, made when the first light sample asks for it.
     areas: OnceLock<Option<Discrete>>,
 }
@@ -24,7 +23,10 @@ pub struct TriangleMesh {
 impl TriangleMesh {
     /// A mesh whose coordinates are the world's.
     pub fn new(mesh: Mesh) -> Self {
-        Self { mesh, flip_normals: false, areas: OnceLock::new() }
+        Self {
+            mesh,
+            areas: OnceLock::new(),
+        }
     }
 
     /// The triangles.
@@ -57,7 +59,7 @@ impl TriangleMesh {
             let [n0, n1, n2] = corners.map(|i| self.mesh.normals[i as usize]);
             let n = (b[0] * n0 + b[1] * n1 + b[2] * n2).normalize_or_zero();
             if n != Vec3::ZERO {
-                normal = if self.flip_normals { -n } else { n };
+                normal = n;
             }
         }
         let uv = if self.mesh.uvs.is_empty() {
@@ -69,11 +71,10 @@ impl TriangleMesh {
         (normal, uv)
     }
 
-    fn geometric_normal(&self, [a, b, c]: [Vec3; 3]) -> Vec3 {
+    fn geometric_normal([a, b, c]: [Vec3; 3]) -> Vec3 {
         // In double precision, for the cross product of a sliver cancels.
         let [a, b, c] = [a, b, c].map(Vec3::as_dvec3);
-        let n = (b - a).cross(c - a).normalize_or_zero().as_vec3();
-        if self.flip_normals { -n } else { n }
+        (b - a).cross(c - a).normalize_or_zero().as_vec3()
     }
 
     /// The change of position with u and with v (PBRT 4th ed., 6.5.3); zero where the coordinates do
@@ -83,13 +84,17 @@ impl TriangleMesh {
         if self.mesh.uvs.is_empty() {
             return (e1, e2);
         }
-        let [uv0, uv1, uv2] = self.mesh.triangles[triangle as usize].map(|i| self.mesh.uvs[i as usize]);
+        let [uv0, uv1, uv2] =
+            self.mesh.triangles[triangle as usize].map(|i| self.mesh.uvs[i as usize]);
         let (d1, d2) = (uv1 - uv0, uv2 - uv0);
         let determinant = d1.x * d2.y - d1.y * d2.x;
         if determinant == 0.0 {
             return (Vec3::ZERO, Vec3::ZERO);
         }
-        ((d2.y * e1 - d1.y * e2) / determinant, (d1.x * e2 - d2.x * e1) / determinant)
+        (
+            (d2.y * e1 - d1.y * e2) / determinant,
+            (d1.x * e2 - d2.x * e1) / determinant,
+        )
     }
 }
 
@@ -99,7 +104,9 @@ impl Surface for TriangleMesh {
     }
 
     fn bounds(&self, primitive: u32) -> Bounds {
-        self.corners(primitive).into_iter().fold(Bounds::EMPTY, Bounds::with)
+        self.corners(primitive)
+            .into_iter()
+            .fold(Bounds::EMPTY, Bounds::with)
     }
 
     fn intersect(&self, _primitive: u32, _ray: &Ray) -> Option<(f32, f32, f32)> {
@@ -112,7 +119,7 @@ impl Surface for TriangleMesh {
         let terms = [b[0] * corners[0], b[1] * corners[1], b[2] * corners[2]];
         let position = terms[0] + terms[1] + terms[2];
         let error = offset::gamma(7) * (terms[0].abs() + terms[1].abs() + terms[2].abs());
-        let normal = self.geometric_normal(corners);
+        let normal = Self::geometric_normal(corners);
         let (shading, uv) = self.shading(hit.primitive, b, normal);
         let (dp_du, dp_dv) = self.tangents(hit.primitive, corners);
         let frame = Frame::along(shading, dp_du);
@@ -146,10 +153,15 @@ impl Surface for TriangleMesh {
         let b = warp::uniform_triangle(Vec2::new(drawn.rest, u.y));
         let b = [1.0 - b.x - b.y, b.x, b.y];
         let position = b[0] * corners[0] + b[1] * corners[1] + b[2] * corners[2];
-        let geometric = self.geometric_normal(corners);
+        let geometric = Self::geometric_normal(corners);
         let (normal, uv) = self.shading(triangle, b, geometric);
         let pdf = area_to_solid_angle(areas.total(), from, position, geometric);
-        (pdf > 0.0).then_some(SurfaceSample { position, normal, uv, pdf })
+        (pdf > 0.0).then_some(SurfaceSample {
+            position,
+            normal,
+            uv,
+            pdf,
+        })
     }
 
     fn pdf(&self, from: Vec3, at: &Interaction<'_>) -> f32 {
@@ -162,27 +174,47 @@ impl Surface for TriangleMesh {
 }
 
 /// Puts a mesh into the world as its shape says: `to_world`, `face_normals`, `flip_normals`.
-pub(super) fn place(mut mesh: Mesh, properties: &Properties<'_>) -> Result<Geometry> {
-    let to_world = to_world(properties)?;
+pub(super) fn place(mut mesh: Mesh, properties: &Properties<'_>) -> Result<Shape> {
+    mesh.transform(&to_world(properties)?);
+    // A transform can carry finite corners to infinity.
+    let dropped = mesh.check().dropped_triangles;
     if properties.boolean("face_normals")?.unwrap_or(false) {
-        mesh.normals.clear();
+        mesh.drop_normals();
     } else if mesh.normals.is_empty() {
         mesh.compute_normals();
     }
-    mesh.transform(&to_world);
-    let flip_normals = properties.boolean("flip_normals")?.unwrap_or(false);
-    Ok(Geometry::Mesh(TriangleMesh { mesh, flip_normals, areas: OnceLock::new() }))
+    if properties.boolean("flip_normals")?.unwrap_or(false) {
+        mesh.flip_normals();
+    }
+    let mut shape = Shape::from(Geometry::Mesh(TriangleMesh::new(mesh)));
+    if dropped > 0 {
+        let message = format!(
+            "{dropped} triangles were dropped, for to_world carries them out of all bounds"
+        );
+        shape
+            .warnings
+            .extend_from_slice(properties.error("to_world", message).problems());
+    }
+    Ok(shape)
 }
 
 /// Reads the file that a mesh plugin names, with that plugin's own options.
-pub(super) fn load(properties: &Properties<'_>) -> Result<Geometry> {
-    use crate::mesh::{ReadOptions, read};
+pub(super) fn load(properties: &Properties<'_>) -> Result<Shape> {
     let Some(path) = properties.file("filename")? else {
-        return Err(properties.error("filename", format!("{} needs a filename", properties.plugin()))
+        return Err(properties
+            .error(
+                "filename",
+                format!("{} needs a filename", properties.plugin()),
+            )
             .help(r#"add <string name="filename" value="…"/>"#));
     };
     let flip_tex_coords = properties.boolean("flip_tex_coords")?;
-    let options = ReadOptions { flip_tex_coords, ..ReadOptions::default() };
+    let options = ReadOptions {
+        flip_tex_coords,
+        ..ReadOptions::default()
+    };
     let loaded = read(&path, &options).map_err(|e| e.at(properties.location()))?;
-    place(loaded.mesh, properties)
+    let mut shape = place(loaded.mesh, properties)?;
+    shape.warnings.splice(0..0, loaded.warnings);
+    Ok(shape)
 }

@@ -12,7 +12,7 @@ mod rectangle;
 use glam::{DMat4, Vec2, Vec3};
 
 use crate::description::{Kind, Properties};
-use crate::error::Result;
+use crate::error::{Problem, Result};
 use crate::family;
 use crate::interaction::{Hit, Interaction, Ray};
 use crate::math::Transform;
@@ -31,18 +31,27 @@ pub struct Bounds {
 
 impl Bounds {
     /// Contains nothing.
-    pub const EMPTY: Self = Self { min: Vec3::INFINITY, max: Vec3::NEG_INFINITY };
+    pub const EMPTY: Self = Self {
+        min: Vec3::INFINITY,
+        max: Vec3::NEG_INFINITY,
+    };
 
     /// The smallest box around both.
     #[must_use]
     pub fn union(self, other: Self) -> Self {
-        Self { min: self.min.min(other.min), max: self.max.max(other.max) }
+        Self {
+            min: self.min.min(other.min),
+            max: self.max.max(other.max),
+        }
     }
 
     /// The smallest box around this and `point`.
     #[must_use]
     pub fn with(self, point: Vec3) -> Self {
-        Self { min: self.min.min(point), max: self.max.max(point) }
+        Self {
+            min: self.min.min(point),
+            max: self.max.max(point),
+        }
     }
 
     /// A box around the box's image, with room for rounding.
@@ -50,7 +59,8 @@ impl Bounds {
     pub fn transformed(self, transform: &Transform) -> Self {
         let mut bounds = Self::EMPTY;
         for corner in 0..8 {
-            let pick = |bit: u32, low: f32, high: f32| if corner >> bit & 1 == 0 { low } else { high };
+            let pick =
+                |bit: u32, low: f32, high: f32| if corner >> bit & 1 == 0 { low } else { high };
             let p = Vec3::new(
                 pick(0, self.min.x, self.max.x),
                 pick(1, self.min.y, self.max.y),
@@ -123,7 +133,25 @@ impl std::ops::Deref for Geometry {
     }
 }
 
-type Build = fn(&Properties<'_>) -> Result<Geometry>;
+/// What a shape plugin builds.
+#[derive(Debug)]
+pub struct Shape {
+    /// In world space.
+    pub geometry: Geometry,
+    /// What the user should know of its file.
+    pub warnings: Vec<Problem>,
+}
+
+impl From<Geometry> for Shape {
+    fn from(geometry: Geometry) -> Self {
+        Self {
+            geometry,
+            warnings: Vec::new(),
+        }
+    }
+}
+
+type Build = fn(&Properties<'_>) -> Result<Shape>;
 
 /// The shape plugins.
 const PLUGINS: &[(&str, Build)] = &[
@@ -139,12 +167,20 @@ pub fn names() -> Vec<&'static str> {
     PLUGINS.iter().map(|(name, _)| *name).collect()
 }
 
-/// Builds the geometry that `properties` names, in world space.
-pub fn build(properties: &Properties<'_>) -> Result<Geometry> {
+/// Builds the shape that `properties` names.
+pub fn build(properties: &Properties<'_>) -> Result<Shape> {
     debug_assert_eq!(properties.kind(), Kind::Shape);
-    match PLUGINS.iter().find(|(name, _)| *name == properties.plugin()) {
+    match PLUGINS
+        .iter()
+        .find(|(name, _)| *name == properties.plugin())
+    {
         Some((_, build)) => build(properties),
-        None => Err(family::unknown(properties, "shape", properties.plugin(), &names())),
+        None => Err(family::unknown(
+            properties,
+            "shape",
+            properties.plugin(),
+            &names(),
+        )),
     }
 }
 
@@ -158,5 +194,9 @@ fn area_to_solid_angle(area: f64, from: Vec3, position: Vec3, normal: Vec3) -> f
     let way = position - from;
     let squared = way.length_squared();
     let cosine = normal.dot(way).abs() / squared.sqrt();
-    if cosine > 0.0 { (f64::from(squared) / (f64::from(cosine) * area)) as f32 } else { 0.0 }
+    if cosine > 0.0 {
+        (f64::from(squared) / (f64::from(cosine) * area)) as f32
+    } else {
+        0.0
+    }
 }

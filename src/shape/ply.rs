@@ -1,10 +1,10 @@
 //! `ply`: a mesh in the Stanford polygon format, from `filename`, with `to_world`, `face_normals`,
 //! `flip_normals` and `flip_tex_coords`.
 
-use super::{Geometry, mesh};
+use super::{Shape, mesh};
 use crate::description::Properties;
 use crate::error::Result;
 
-pub(super) fn build(properties: &Properties<'_>) -> Result<Geometry> {
+pub(super) fn build(properties: &Properties<'_>) -> Result<Shape> {
     mesh::load(properties)
 }

@@ -1,10 +1,10 @@
 //! `rectangle`: the square [−1, 1]² at z = 0 facing +z, with uv = (p + 1)/2, under `to_world` and `flip_normals`.
 
-use super::{Geometry, mesh};
+use super::{Shape, mesh::place};
 use crate::description::Properties;
 use crate::error::Result;
-use crate::mesh::generate;
+use crate::mesh;
 
-pub(super) fn build(properties: &Properties<'_>) -> Result<Geometry> {
-    mesh::place(generate::rectangle(), properties)
+pub(super) fn build(properties: &Properties<'_>) -> Result<Shape> {
+    place(mesh::rectangle(), properties)
 }

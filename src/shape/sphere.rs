@@ -7,7 +7,7 @@ use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
 use glam::{DVec3, Mat3, Vec2, Vec3};
 
-use super::{Bounds, Geometry, Surface, SurfaceSample, area_to_solid_angle, to_world};
+use super::{Bounds, Geometry, Shape, Surface, SurfaceSample, area_to_solid_angle, to_world};
 use crate::description::Properties;
 use crate::error::Result;
 use crate::interaction::{Hit, Interaction, Ray};
@@ -24,7 +24,7 @@ pub struct Sphere {
     flip_normals: bool,
 }
 
-pub(super) fn build(properties: &Properties<'_>) -> Result<Geometry> {
+pub(super) fn build(properties: &Properties<'_>) -> Result<Shape> {
     let to_world = to_world(properties)?;
     let center = properties.vector("center")?.unwrap_or(DVec3::ZERO);
     let radius = properties.float("radius")?.unwrap_or(1.0);
@@ -37,13 +37,22 @@ pub(super) fn build(properties: &Properties<'_>) -> Result<Geometry> {
             .error("to_world", "a sphere cannot be stretched or sheared")
             .help("scale all axes alike"));
     }
-    let (center, radius) = (to_world.transform_point3(center).as_vec3(), (radius * scale) as f32);
+    let (center, radius) = (
+        to_world.transform_point3(center).as_vec3(),
+        (radius * scale) as f32,
+    );
     if !(radius > 0.0 && radius.is_finite() && center.is_finite()) {
         return Err(properties.error("radius", "a sphere needs a positive, finite radius"));
     }
     let [x, y, z] = axes.map(|a| (a / scale).as_vec3());
     let flip_normals = properties.boolean("flip_normals")?.unwrap_or(false);
-    Ok(Geometry::Sphere(Sphere { center, radius, rotation: Mat3::from_cols(x, y, z), flip_normals }))
+    let sphere = Sphere {
+        center,
+        radius,
+        rotation: Mat3::from_cols(x, y, z),
+        flip_normals,
+    };
+    Ok(Geometry::Sphere(sphere).into())
 }
 
 impl Sphere {
@@ -78,11 +87,17 @@ impl Surface for Sphere {
 
     fn bounds(&self, _primitive: u32) -> Bounds {
         let reach = Vec3::splat(self.radius) + (self.center.abs() + self.radius) * offset::gamma(5);
-        Bounds { min: self.center - reach, max: self.center + reach }
+        Bounds {
+            min: self.center - reach,
+            max: self.center + reach,
+        }
     }
 
     fn intersect(&self, _primitive: u32, ray: &Ray) -> Option<(f32, f32, f32)> {
-        let (o, d) = ((ray.origin.as_dvec3() - self.center.as_dvec3()), ray.direction.as_dvec3());
+        let (o, d) = (
+            (ray.origin.as_dvec3() - self.center.as_dvec3()),
+            ray.direction.as_dvec3(),
+        );
         let (a, b) = (d.length_squared(), o.dot(d));
         let r2 = f64::from(self.radius).powi(2);
         // The distance of the line from the centre, without the cancellation of b² − ac.
@@ -96,7 +111,11 @@ impl Surface for Sphere {
         let c = o.length_squared() - r2;
         let (t0, t1) = (q / a, if q == 0.0 { q / a } else { c / q });
         let (near, far) = (t0.min(t1), t0.max(t1));
-        [near, far].into_iter().map(|t| t as f32).find(|&t| t > 0.0 && t <= ray.t_max).map(|t| (t, 0.0, 0.0))
+        [near, far]
+            .into_iter()
+            .map(|t| t as f32)
+            .find(|&t| t > 0.0 && t <= ray.t_max)
+            .map(|t| (t, 0.0, 0.0))
     }
 
     fn interaction(&self, ray: &Ray, hit: &Hit) -> Interaction<'_> {
@@ -108,7 +127,10 @@ impl Surface for Sphere {
         let rim = (local.x * local.x + local.y * local.y).sqrt();
         let (dp_du, dp_dv) = if rim > 0.0 {
             let (cos, sin) = (local.x / rim, local.y / rim);
-            (Vec3::new(-local.y, local.x, 0.0) * TAU, Vec3::new(local.z * cos, local.z * sin, -rim) * PI)
+            (
+                Vec3::new(-local.y, local.x, 0.0) * TAU,
+                Vec3::new(local.z * cos, local.z * sin, -rim) * PI,
+            )
         } else {
             (Vec3::ZERO, Vec3::new(local.z, 0.0, 0.0) * PI)
         };
@@ -142,8 +164,12 @@ impl Surface for Sphere {
             let outward = warp::uniform_sphere(u);
             let position = self.center + self.radius * outward;
             let pdf = area_to_solid_angle(self.area(), from, position, outward);
-            let sample =
-                SurfaceSample { position, normal: self.side() * outward, uv: self.uv(outward), pdf };
+            let sample = SurfaceSample {
+                position,
+                normal: self.side() * outward,
+                uv: self.uv(outward),
+                pdf,
+            };
             return (pdf > 0.0).then_some(sample);
         };
         // The direction of the cone's sample, and from it the normal where that direction meets the
@@ -152,15 +178,26 @@ impl Surface for Sphere {
         let distance = way.length();
         let cone = warp::uniform_cone(u, one_minus_cos);
         let (sin2, cos) = (1.0 - cone.z * cone.z, cone.z);
-        let to_hit = distance * cos - (self.radius.powi(2) - distance.powi(2) * sin2).max(0.0).sqrt();
-        let cos_alpha = (distance.powi(2) + self.radius.powi(2) - to_hit.powi(2)) / (2.0 * distance * self.radius);
+        let to_hit = distance * cos
+            - (self.radius.powi(2) - distance.powi(2) * sin2)
+                .max(0.0)
+                .sqrt();
+        let cos_alpha = (distance.powi(2) + self.radius.powi(2) - to_hit.powi(2))
+            / (2.0 * distance * self.radius);
         let sin_alpha = (1.0 - cos_alpha * cos_alpha).max(0.0).sqrt();
         let around = Vec2::new(cone.x, cone.y).normalize_or_zero() * sin_alpha;
         let frame = Frame::around(way / distance);
-        let outward = frame.to_world(Vec3::new(around.x, around.y, -cos_alpha)).normalize();
+        let outward = frame
+            .to_world(Vec3::new(around.x, around.y, -cos_alpha))
+            .normalize();
         let pdf = warp::uniform_cone_pdf(one_minus_cos);
         let position = self.center + self.radius * outward;
-        Some(SurfaceSample { position, normal: self.side() * outward, uv: self.uv(outward), pdf })
+        Some(SurfaceSample {
+            position,
+            normal: self.side() * outward,
+            uv: self.uv(outward),
+            pdf,
+        })
     }
 
     fn pdf(&self, from: Vec3, at: &Interaction<'_>) -> f32 {

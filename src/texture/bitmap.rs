@@ -59,7 +59,8 @@ impl<C: ColorModel> Bitmap<C> {
             "bilinear" => false,
             "nearest" => true,
             other => {
-                let error = properties.error("filter_type", format!("unknown filter type \"{other}\""));
+                let error =
+                    properties.error("filter_type", format!("unknown filter type \"{other}\""));
                 return Err(error.help("there are bilinear and nearest"));
             }
         };
@@ -78,7 +79,12 @@ impl<C: ColorModel> Bitmap<C> {
         };
         let to_uv = to_uv(properties)?;
         let key = (path, palette.role, raw);
-        let lock = || palette.texels.lock().expect("no thread panics while it holds the cache");
+        let lock = || {
+            palette
+                .texels
+                .lock()
+                .expect("no thread panics while it holds the cache")
+        };
         let cached = lock().get(&key).cloned();
         let texels = match cached {
             Some(texels) => texels,
@@ -87,32 +93,62 @@ impl<C: ColorModel> Bitmap<C> {
                 lock().entry(key).or_insert(Arc::new(loaded)).clone()
             }
         };
-        Ok(Self { texels, nearest, wrap, to_uv })
+        Ok(Self {
+            texels,
+            nearest,
+            wrap,
+            to_uv,
+        })
     }
 
     fn texel(&self, x: i64, y: i64, wavelengths: &C::Wavelengths) -> C::Sample {
-        let Texels { width, height, texels } = &*self.texels;
+        let Texels {
+            width,
+            height,
+            texels,
+        } = &*self.texels;
         let (x, y) = (self.wrap.apply(x, *width), self.wrap.apply(y, *height));
         C::evaluate_texel(&texels[y * width + x], wavelengths)
     }
 }
 
-fn load<C: ColorModel>(path: &std::path::Path, palette: &Palette<C>, raw: bool) -> Result<Texels<C>> {
+fn load<C: ColorModel>(
+    path: &std::path::Path,
+    palette: &Palette<C>,
+    raw: bool,
+) -> Result<Texels<C>> {
     let picture = image::read(path, &Limits::default())?;
     let encoded = picture.encoding != Encoding::Linear && !raw;
     let decode = |v: f32| if encoded { srgb::decode(v) } else { v };
     let (width, height) = (picture.image.width(), picture.image.height());
     let Some([r, g, b]) = picture.image.rgb() else {
-        let message = format!("{}: no colour channels among {:?}", path.display(), picture.image.channels());
+        let message = format!(
+            "{}: no colour channels among {:?}",
+            path.display(),
+            picture.image.channels()
+        );
         return Err(crate::error::Error::input(message));
     };
-    let role = if raw && palette.role == Role::Reflectance { Role::Quantity } else { palette.role };
+    let role = if raw && palette.role == Role::Reflectance {
+        Role::Quantity
+    } else {
+        palette.role
+    };
     let texel = |x, y| {
         let rgb = [r, g, b].map(|c| decode(picture.image.get(x, y, c)));
-        palette.color.texel(rgb.map(|v| if v.is_finite() { v } else { 0.0 }), role)
+        palette
+            .color
+            .texel(rgb.map(|v| if v.is_finite() { v } else { 0.0 }), role)
     };
-    let texels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| texel(x, y)).collect();
-    Ok(Texels { width: width as usize, height: height as usize, texels })
+    let texels = (0..height)
+        .flat_map(|y| (0..width).map(move |x| (x, y)))
+        .map(|(x, y)| texel(x, y))
+        .collect();
+    Ok(Texels {
+        width: width as usize,
+        height: height as usize,
+        texels,
+    })
 }
 
 impl<C: ColorModel> Pattern<C> for Bitmap<C> {
@@ -126,7 +162,8 @@ impl<C: ColorModel> Pattern<C> for Bitmap<C> {
         let (corner, f) = (p.floor(), p - p.floor());
         let (x, y) = (corner.x as i64, corner.y as i64);
         let row = |y| {
-            self.texel(x, y, wavelengths) * (1.0 - f.x) + self.texel(x.saturating_add(1), y, wavelengths) * f.x
+            self.texel(x, y, wavelengths) * (1.0 - f.x)
+                + self.texel(x.saturating_add(1), y, wavelengths) * f.x
         };
         let value = row(y) * (1.0 - f.y) + row(y.saturating_add(1)) * f.y;
         value.map(|v| if v.is_finite() { v } else { 0.0 })

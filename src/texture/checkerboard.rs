@@ -20,7 +20,10 @@ impl<C: ColorModel> Checkerboard<C> {
     pub(super) fn build(properties: &Properties<'_>, palette: &Palette<C>) -> Result<Self> {
         let color0 = palette.texture(properties, "color0", palette.role, Color::Grey(0.4))?;
         let color1 = palette.texture(properties, "color1", palette.role, Color::Grey(0.2))?;
-        Ok(Self { colors: Box::new([color0, color1]), to_uv: to_uv(properties)? })
+        Ok(Self {
+            colors: Box::new([color0, color1]),
+            to_uv: to_uv(properties)?,
+        })
     }
 }
 

@@ -50,13 +50,21 @@ type TexelCache<C> = Arc<Mutex<HashMap<(PathBuf, Role, bool), Arc<Texels<C>>>>>;
 impl<C: ColorModel> Palette<C> {
     /// Nothing loaded yet.
     pub fn new(color: C) -> Self {
-        Self { color, role: Role::Reflectance, texels: TexelCache::default() }
+        Self {
+            color,
+            role: Role::Reflectance,
+            texels: TexelCache::default(),
+        }
     }
 
     /// The same palette for colours that stand for something else.
     #[must_use]
     pub fn with_role(&self, role: Role) -> Self {
-        Self { color: self.color.clone(), role, texels: self.texels.clone() }
+        Self {
+            color: self.color.clone(),
+            role,
+            texels: self.texels.clone(),
+        }
     }
 
     /// The colour called `name`, or `default`; textures are refused.
@@ -70,7 +78,10 @@ impl<C: ColorModel> Palette<C> {
         let store = |color: &Color| self.color.store(color, role);
         match properties.value(name) {
             None => store(&default).map_err(|e| properties.error(name, e)),
-            Some(Property { value: Value::Object(_), .. }) => {
+            Some(Property {
+                value: Value::Object(_),
+                ..
+            }) => {
                 let child = properties.object(name)?.expect("the property is an object");
                 store(&spectrum(&child)?).map_err(|e| child.error("value", e))
             }
@@ -86,24 +97,37 @@ impl<C: ColorModel> Palette<C> {
         role: Role,
         default: Color,
     ) -> Result<Texture<C>> {
-        if let Some(Property { value: Value::Object(_), .. }) = properties.value(name) {
+        if let Some(Property {
+            value: Value::Object(_),
+            ..
+        }) = properties.value(name)
+        {
             let child = properties.object(name)?.expect("the property is an object");
             if child.kind() == Kind::Texture {
                 return Texture::build(&child, &self.with_role(role));
             }
         }
-        Ok(Texture::Uniform(uniform::Uniform::new(self.color(properties, name, role, default)?)))
+        Ok(Texture::Uniform(uniform::Uniform::new(
+            self.color(properties, name, role, default)?,
+        )))
     }
 
     /// The same value, which must be valid for the palette's role, everywhere.
     pub fn uniform(&self, color: &Color) -> std::result::Result<Texture<C>, String> {
-        Ok(Texture::Uniform(uniform::Uniform::new(self.color.store(color, self.role)?)))
+        Ok(Texture::Uniform(uniform::Uniform::new(
+            self.color.store(color, self.role)?,
+        )))
     }
 }
 
 impl Palette<Mono> {
     /// The number or texture called `name`, or `default` everywhere.
-    pub fn number(&self, properties: &Properties<'_>, name: &'static str, default: f64) -> Result<Texture<Mono>> {
+    pub fn number(
+        &self,
+        properties: &Properties<'_>,
+        name: &'static str,
+        default: f64,
+    ) -> Result<Texture<Mono>> {
         self.texture(properties, name, Role::Quantity, Color::Grey(default))
     }
 }
@@ -120,7 +144,10 @@ pub struct Palettes<C: ColorModel> {
 impl<C: ColorModel> Palettes<C> {
     /// Nothing loaded yet.
     pub fn new(color: C) -> Self {
-        Self { colors: Palette::new(color), numbers: Palette::new(Mono) }
+        Self {
+            colors: Palette::new(color),
+            numbers: Palette::new(Mono),
+        }
     }
 }
 
@@ -133,9 +160,12 @@ fn color(property: &Property) -> Result<Color> {
         Value::Spectrum(Spectrum::Uniform(value)) => Color::Flat(*value),
         Value::Spectrum(Spectrum::Curve(points)) => Color::Curve(points.clone()),
         _ => {
-            return Err(Error::input(format!("{:?} must be a colour, a spectrum or a texture", property.name))
-                .at(&property.location)
-                .help(r#"such as <rgb name="…" value="0.5, 0.5, 0.5"/>"#));
+            return Err(Error::input(format!(
+                "{:?} must be a colour, a spectrum or a texture",
+                property.name
+            ))
+            .at(&property.location)
+            .help(r#"such as <rgb name="…" value="0.5, 0.5, 0.5"/>"#));
         }
     })
 }
@@ -152,9 +182,15 @@ fn spectrum(properties: &Properties<'_>) -> Result<Color> {
 
 /// The property `to_uv`: what is done to texture coordinates before they are looked up.
 fn to_uv(properties: &Properties<'_>) -> Result<Mat3> {
-    let Some(m) = properties.transform("to_uv")? else { return Ok(Mat3::IDENTITY) };
+    let Some(m) = properties.transform("to_uv")? else {
+        return Ok(Mat3::IDENTITY);
+    };
     let column = |c: glam::DVec4| Vec3::new(c.x as f32, c.y as f32, 0.0);
-    Ok(Mat3::from_cols(column(m.x_axis), column(m.y_axis), Vec3::new(m.w_axis.x as f32, m.w_axis.y as f32, 1.0)))
+    Ok(Mat3::from_cols(
+        column(m.x_axis),
+        column(m.y_axis),
+        Vec3::new(m.w_axis.x as f32, m.w_axis.y as f32, 1.0),
+    ))
 }
 
 /// Texture coordinates after `to_uv`.

@@ -20,7 +20,9 @@ impl<C: ColorModel> Uniform<C> {
     pub(super) fn build(properties: &Properties<'_>, palette: &Palette<C>) -> Result<Self> {
         let value = properties.float("value")?.unwrap_or(1.0);
         let stored = palette.color.store(&Color::Grey(value), palette.role);
-        stored.map(Self::new).map_err(|e| properties.error("value", e))
+        stored
+            .map(Self::new)
+            .map_err(|e| properties.error("value", e))
     }
 }
 

@@ -6,8 +6,6 @@ mod structure;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
-use std::sync::atomic::AtomicBool;
 
 use super::defines::Defines;
 use super::element::{Element, File};
@@ -261,14 +259,10 @@ impl<'o> Reader<'o> {
         if let Some(id) = id {
             self.register(id, node, element, "id")?;
         }
+        let description = Node::new(kind, plugin, element.location.clone());
         self.nodes.push(Node {
-            kind,
-            plugin: plugin.to_owned(),
             id: id.map(str::to_owned),
-            location: element.location.clone(),
-            properties: Vec::new(),
-            asked: Mutex::default(),
-            visited: AtomicBool::new(false),
+            ..description
         });
         if file.version < Version::CURRENT_NAMES {
             self.old_nodes.push(node);

@@ -1,0 +1,108 @@
+//! What the caller of a render decides: settings of the run, and overrides of what the scene says.
+
+use std::num::NonZeroUsize;
+
+use crate::accel::Method;
+use crate::description::{Description, Kind, NodeId, Value};
+use crate::sensor::Window;
+
+/// Which colour model a render uses.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Colors {
+    /// Linear BT.709.
+    #[default]
+    Rgb,
+    /// So many spectral bands over 360–830 nm, 1 to 32.
+    Bands(usize),
+}
+
+/// Settings of a run, which no scene file knows.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// Names the scene in the image's metadata.
+    pub scene: String,
+    /// Seed of the random numbers.
+    pub seed: u64,
+    /// Threads; one a processor where absent.
+    pub threads: Option<NonZeroUsize>,
+    /// RGB or bands.
+    pub colors: Colors,
+    /// Tree or brute force.
+    pub method: Method,
+}
+
+/// Values in place of the scene's own.
+#[derive(Clone, Debug, Default)]
+pub struct Overrides {
+    /// Samples a pixel.
+    pub spp: Option<u32>,
+    /// Sampler plugin.
+    pub sampler: Option<String>,
+    /// Width and height of the film.
+    pub size: Option<(u32, u32)>,
+    /// The part of the film to render.
+    pub crop: Option<Window>,
+    /// Integrator plugin.
+    pub integrator: Option<String>,
+    /// The integrator's `max_depth`.
+    pub max_depth: Option<i64>,
+}
+
+impl Overrides {
+    /// Writes the values into `description`, so that they are checked as the file's own are.
+    pub fn apply(&self, description: &mut Description) {
+        let root = description.root().node_id();
+        let integrator = description.child_or_new(root, Kind::Integrator, "path");
+        if let Some(plugin) = &self.integrator {
+            description.replace(integrator, plugin);
+        }
+        if let Some(depth) = self.max_depth {
+            let innermost = innermost(description, integrator);
+            description.set(innermost, "max_depth", Value::Integer(depth));
+        }
+        let sensors: Vec<NodeId> = description
+            .root()
+            .children(Kind::Sensor)
+            .iter()
+            .map(|s| s.node_id())
+            .collect();
+        for sensor in sensors {
+            self.apply_to_sensor(description, sensor);
+        }
+    }
+
+    fn apply_to_sensor(&self, description: &mut Description, sensor: NodeId) {
+        let film = description.child_or_new(sensor, Kind::Film, "hdrfilm");
+        let mut set =
+            |name: &str, value: u32| description.set(film, name, Value::Integer(value.into()));
+        if let Some((width, height)) = self.size {
+            set("width", width);
+            set("height", height);
+        }
+        if let Some(crop) = self.crop {
+            set("crop_offset_x", crop.x);
+            set("crop_offset_y", crop.y);
+            set("crop_width", crop.width);
+            set("crop_height", crop.height);
+        }
+        let sampler = description.child_or_new(sensor, Kind::Sampler, "independent");
+        if let Some(plugin) = &self.sampler {
+            description.replace(sampler, plugin);
+        }
+        if let Some(spp) = self.spp {
+            description.set(sampler, "sample_count", Value::Integer(spp.into()));
+        }
+    }
+}
+
+/// The integrator inside a wrapper such as `moment`.
+fn innermost(description: &Description, mut integrator: NodeId) -> NodeId {
+    while let Some(child) = description
+        .node(integrator)
+        .children(Kind::Integrator)
+        .first()
+    {
+        integrator = child.node_id();
+    }
+    integrator
+}

@@ -1,0 +1,29 @@
+//! How a render tells its caller where it is, and asks whether to go on. The library prints nothing.
+
+/// What a render is doing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Phase {
+    /// Reading meshes; steps are shapes.
+    Load,
+    /// Building trees; a single step.
+    Build,
+    /// Tracing; steps are samples.
+    Render,
+}
+
+/// Somebody who watches a render, from several threads at once.
+pub trait Progress: Sync {
+    /// A phase begins that has `total` steps.
+    fn begin(&self, phase: Phase, total: u64);
+    /// `steps` more are done, which traced `rays` rays.
+    fn advance(&self, steps: u64, rays: u64);
+}
+
+/// Watches nothing.
+#[derive(Clone, Copy, Debug)]
+pub struct Silent;
+
+impl Progress for Silent {
+    fn begin(&self, _phase: Phase, _total: u64) {}
+    fn advance(&self, _steps: u64, _rays: u64) {}
+}
