@@ -326,3 +326,96 @@ impl Mesh {
 fn unit_or(v: DVec3, otherwise: Vec3) -> Vec3 {
     v.try_normalize().map_or(otherwise, DVec3::as_vec3)
 }
+
+#[cfg(test)]
+mod transform_tests {
+    use super::*;
+
+    /// Its faces look outwards.
+    fn tetrahedron() -> Mesh {
+        Mesh {
+            positions: vec![Vec3::ZERO, Vec3::X, 2.0 * Vec3::Y, 3.0 * Vec3::Z],
+            triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
+            ..Mesh::default()
+        }
+    }
+
+    #[test]
+    fn normals_computed_after_a_mirroring_transform_follow_the_winding_as_mitsubas_do() {
+        let mut mesh = tetrahedron();
+        mesh.transform(&DMat4::from_scale(DVec3::new(-1.0, 1.0, 1.0)));
+        mesh.compute_normals();
+        assert_eq!(mesh.triangles, tetrahedron().triangles);
+        let mitsuba = Vec3::new(0.791_601_06, 0.411_490_05, 0.451_711_83);
+        assert!(
+            mesh.normals[1].distance(mitsuba) < 1e-6,
+            "{}",
+            mesh.normals[1]
+        );
+    }
+
+    #[test]
+    fn given_normals_turn_by_the_inverse_transpose_whatever_the_sign() {
+        let mut mesh = tetrahedron();
+        mesh.normals = vec![Vec3::new(0.0, 1.0, 1.0).normalize(); 4];
+        let before = mesh.normals.clone();
+        mesh.transform(&DMat4::from_scale(DVec3::new(-1.0, 1.0, 1.0)));
+        assert_eq!(mesh.normals, before);
+        mesh.transform(&DMat4::from_scale(DVec3::new(1.0, 4.0, 1.0)));
+        let mitsuba = Vec3::new(0.0, 0.242_535_62, 0.970_142_5);
+        assert!(mesh.normals[0].distance(mitsuba) < 1e-6);
+        mesh.transform(&DMat4::from_scale(DVec3::new(1.0, 0.0, 1.0)));
+        assert_eq!(mesh.normals[0], Vec3::Y);
+        mesh.transform(&DMat4::from_scale(DVec3::ZERO));
+        assert_eq!(mesh.normals[0], Vec3::Y);
+    }
+
+    #[test]
+    fn bounds_and_area_are_those_of_the_triangles_alone() {
+        let mut mesh = rectangle();
+        mesh.positions.push(Vec3::splat(100.0));
+        mesh.positions.push(Vec3::NAN);
+        assert_eq!(
+            mesh.bounds(),
+            Some((Vec3::new(-1.0, -1.0, 0.0), Vec3::new(1.0, 1.0, 0.0)))
+        );
+        assert_eq!(mesh.area(), 4.0);
+        assert_eq!(Mesh::default().bounds(), None);
+        assert!(rectangle().bytes() >= 4 * (12 + 12 + 8) + 2 * 12);
+    }
+
+    #[test]
+    fn flipping_turns_faces_and_normals_over() {
+        let mut mesh = rectangle();
+        mesh.flip_normals();
+        assert_eq!(
+            normals::face_normal(mesh.corners(&mesh.triangles[0])),
+            Vec3::NEG_Z
+        );
+        assert_eq!(mesh.normals, [Vec3::NEG_Z; 4]);
+        mesh.drop_normals();
+        assert!(mesh.normals.is_empty());
+    }
+
+    #[test]
+    fn a_transform_that_overflows_leaves_triangles_for_the_check_to_drop() {
+        let mut mesh = cube();
+        mesh.positions[0].x = 1e30;
+        mesh.transform(&DMat4::from_scale(DVec3::splat(1e10)));
+        let repairs = mesh.check();
+        assert_eq!((repairs.dropped_triangles, mesh.triangles.len()), (2, 10));
+    }
+
+    #[test]
+    fn a_flat_part_stays_flat_beside_a_smooth_one() {
+        let mut both = sphere(8, 4);
+        let vertices = both.positions.len();
+        let mut flat = cube();
+        flat.drop_normals();
+        both.append(flat);
+        assert_eq!(both.normals.len(), vertices + 36);
+        assert_eq!(both.uvs.len(), both.positions.len());
+        let last = both.triangles.last().unwrap();
+        assert_eq!(both.normals[last[0] as usize], Vec3::NEG_Z);
+    }
+}

@@ -265,3 +265,85 @@ fn parse<T: std::str::FromStr>(word: &[u8]) -> Option<T> {
 fn shown(word: &[u8]) -> String {
     format!("{:?}", String::from_utf8_lossy(&word[..word.len().min(32)]))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::read::testing::decode;
+
+    fn mesh(text: &str) -> Mesh {
+        decode("test.obj", text.as_bytes(), &ReadOptions::default())
+            .unwrap()
+            .mesh
+    }
+
+    #[test]
+    fn vertices_come_in_the_order_of_the_faces_and_are_shared_where_all_indices_agree() {
+        let mesh = mesh(
+            "v 0 0 0\nv 1 0 0\nv 0 2 0\nv 9 9 9\nv 0 0 3\nvn 0 0 2\nvn 0 1 1\nvt 0.25 0.75\nvt 1 1\n\
+             f 1/1/1 3/2/1 2/1/2\nf 1/1/2 2/2/2 5/1/1\nf 3/2/1 2/1/2 5/1/1\n",
+        );
+        // As Mitsuba 3.9.1 gives it.
+        assert_eq!(mesh.triangles, [[0, 1, 2], [3, 4, 5], [1, 2, 5]]);
+        let (x, y, z) = (Vec3::X, 2.0 * Vec3::Y, 3.0 * Vec3::Z);
+        assert_eq!(mesh.positions, [Vec3::ZERO, y, x, Vec3::ZERO, x, z]);
+        let corner = Vec2::new(0.25, 0.25);
+        assert_eq!(mesh.uvs, [corner, Vec2::X, corner, corner, Vec2::X, corner]);
+        assert!(mesh.normals[2].distance(Vec3::new(0.0, 0.5, 0.5).normalize()) < 1e-6);
+    }
+
+    #[test]
+    fn groups_polygons_negative_indices_comments_and_continued_lines_are_understood() {
+        let mesh = mesh(
+            "o a\r\nv 0 0 0 # a comment\r\nv 1 0 0 1 0.5 0.5\r\n  v 1 1 0\nv 0 1 0\ng one\nf 1 2 \\\r\n 3 4 # four\n\
+             g two\nusemtl x\ns off\nv 0 0 1\nf -1 -2/ -5//\nl 1 2\n\nf 1 2\n",
+        );
+        assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3], [4, 3, 0]]);
+        assert!(mesh.normals.is_empty() && mesh.uvs.is_empty());
+    }
+
+    #[test]
+    fn normals_and_texture_coordinates_that_some_corners_lack_are_filled() {
+        let mesh = mesh("v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0.5 0.5\nvn 0 1 0\nf 1//1 2/1 3\n");
+        assert_eq!(mesh.normals, [Vec3::Y, Vec3::Z, Vec3::Z]);
+        assert_eq!(mesh.uvs[1], Vec2::splat(0.5));
+    }
+
+    #[test]
+    fn many_vertices_at_one_position_take_no_longer() {
+        let mut text = "v 0 0 0\n".to_owned();
+        for i in 1..=50_000 {
+            text.push_str(&format!("vt {i} 0\nf 1/{i} 1/{i} 1/1\n"));
+        }
+        assert_eq!(mesh(&text).positions.len(), 50_000);
+    }
+
+    #[test]
+    fn tobj_reads_the_same_triangles() {
+        let path = Path::new(concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../shared/data/meshes/ogre.obj"
+        ));
+        if !path.exists() {
+            return;
+        }
+        let ours = crate::mesh::read(path, &ReadOptions::default())
+            .unwrap()
+            .mesh;
+        let (models, _) = tobj::load_obj(path, &tobj::GPU_LOAD_OPTIONS).unwrap();
+        let corners = models.iter().flat_map(|m| {
+            let at = |i: usize, n: usize| -> &[f32] { &m.mesh.positions[n * i..n * i + n] };
+            m.mesh
+                .indices
+                .iter()
+                .map(move |&i| Vec3::from_slice(at(i as usize, 3)))
+        });
+        let theirs: Vec<Vec3> = corners.collect();
+        let ours: Vec<Vec3> = ours
+            .triangles
+            .iter()
+            .flat_map(|t| ours.corners(t))
+            .collect();
+        assert!(ours.len() > 300_000 && ours == theirs);
+    }
+}

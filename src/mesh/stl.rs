@@ -1,7 +1,7 @@
 //! STL, binary and ASCII (3D Systems, 1989): triangles without shared vertices. Corners at exactly the same
 //! place become one vertex, so that normals can be smooth; the file's face normals are not used, as the
-//! winding says the same. A binary file is one whose length is 84 + 50 n, with n in its header, whatever
-//! text it begins with.
+//! winding says the same. A file is binary, whatever text it begins with, where its length is 84 + 50 n
+//! with n from its header, or where there is a zero byte near its beginning.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -24,8 +24,10 @@ pub(super) fn read(input: Input<'_>, _options: &ReadOptions) -> Result<Decoded> 
     let count = count.map(|&b| u32::from_le_bytes(b) as u64);
     let promised = count.map(|n| HEADER as u64 + n * ROW as u64);
     let mut builder = Builder::default();
-    let trimmed = bytes.trim_ascii_start();
-    if promised != Some(bytes.len() as u64) && trimmed.starts_with(b"solid") {
+    let mut warnings = Vec::new();
+    let text = bytes.trim_ascii_start().starts_with(b"solid")
+        && !bytes[..bytes.len().min(1024)].contains(&0);
+    if text && promised != Some(bytes.len() as u64) {
         builder.read_text(&bytes, path)?;
     } else {
         let (Some(count), Some(promised)) = (count, promised) else {
@@ -42,11 +44,18 @@ pub(super) fn read(input: Input<'_>, _options: &ReadOptions) -> Result<Decoded> 
             );
             return Err(Error::input(message).at(&Location::of_file(path)));
         }
-        builder.read_binary(&bytes[HEADER..promised as usize]);
+        let end = promised as usize;
+        if end < bytes.len() {
+            warnings.push(format!(
+                "{} bytes after the last triangle are not read",
+                bytes.len() - end
+            ));
+        }
+        builder.read_binary(&bytes[HEADER..end]);
     }
     Ok(Decoded {
         mesh: builder.mesh,
-        warnings: Vec::new(),
+        warnings,
     })
 }
 

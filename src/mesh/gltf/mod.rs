@@ -135,6 +135,7 @@ fn walk(input: Input<'_>, options: &ReadOptions) -> Result<Walk> {
         let container = Container::open(&bytes)?;
         let root = gltf::json::deserialize::from_slice(container.json);
         let root = root.map_err(|e| format!("the JSON is malformed: {e}"))?;
+        check_attributes(&root)?;
         let document = Document::from_json(root).map_err(|e| e.to_string())?;
         let scene = document
             .default_scene()
@@ -149,6 +150,19 @@ fn walk(input: Input<'_>, options: &ReadOptions) -> Result<Walk> {
         Ok(walk)
     };
     walked().map_err(|why| Error::input(why).at(&Location::of_file(path)))
+}
+
+/// The crate's own validation indexes with these before it looks at their range.
+fn check_attributes(root: &gltf::json::Root) -> OrWhy<()> {
+    let primitives = root.meshes.iter().flat_map(|mesh| &mesh.primitives);
+    let mut accessors = primitives.flat_map(|p| p.attributes.values());
+    match accessors.find(|index| index.value() >= root.accessors.len()) {
+        Some(index) => Err(format!(
+            "accessor {index} is out of range; there are {}",
+            root.accessors.len()
+        )),
+        None => Ok(()),
+    }
 }
 
 /// What was found on the way through the nodes.
@@ -226,12 +240,9 @@ impl Walk {
             ));
             return Ok(());
         }
-        let Some(positions) = primitive.get(&Semantic::Positions) else {
-            self.warnings.push(format!(
-                "a primitive of {name:?} left out: it has no positions"
-            ));
-            return Ok(());
-        };
+        let positions = primitive
+            .get(&Semantic::Positions)
+            .ok_or("it has no positions")?;
         let corners = primitive.indices().map_or(positions.count(), |i| i.count());
         self.size = self
             .size

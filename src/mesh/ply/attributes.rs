@@ -135,3 +135,89 @@ fn groups<'a>(element: &'a Element, taken: &[usize]) -> Vec<Group<'a>> {
     }
     groups
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::header::{Property, Scalar};
+    use super::*;
+
+    /// The names and channels that `properties` make, and how many warnings.
+    fn planned(properties: &str) -> (Vec<String>, usize) {
+        let property = |word: &str| {
+            let (name, scalar) = match word.strip_prefix("uchar:") {
+                Some(name) => (name, Scalar::U8),
+                None => (word, Scalar::F32),
+            };
+            Property {
+                name: name.to_owned(),
+                kind: Kind::Scalar(scalar),
+            }
+        };
+        let properties: Vec<Property> = properties.split_whitespace().map(property).collect();
+        let element = Element {
+            name: "vertex".into(),
+            count: 0,
+            properties,
+        };
+        let mut warnings = Vec::new();
+        let plans = plan(&element, "vertex_", &[], &mut warnings);
+        let shown = plans.iter().map(|p| {
+            let names = p
+                .properties
+                .iter()
+                .map(|&i| element.properties[i].name.as_str());
+            format!("{}={}", p.name, names.collect::<Vec<_>>().join(","))
+        });
+        (shown.collect(), warnings.len())
+    }
+
+    #[test]
+    fn attributes_are_named_as_mitsuba_names_them() {
+        for (properties, wanted, warnings) in [
+            ("r g b", &["vertex_color=r,g,b"][..], 0),
+            ("b g r a", &["vertex_color=r,g,b,a"], 0),
+            (
+                "uchar:red uchar:green uchar:blue uchar:alpha",
+                &["vertex_color=red,green,blue,alpha"],
+                1,
+            ),
+            (
+                "color_0 color_1 color_2",
+                &["vertex_color=color_0,color_1,color_2"],
+                0,
+            ),
+            (
+                "color_r color_g color_b",
+                &["vertex_color_color=color_r,color_g,color_b"],
+                0,
+            ),
+            ("foo_x foo_y foo_z", &["vertex_foo=foo_x,foo_y,foo_z"], 0),
+            ("foo_1 foo_2 foo_3", &["vertex_foo=foo_1,foo_2,foo_3"], 0),
+            ("foo_r", &["vertex_foo_color=foo_r"], 0),
+            ("weight_0 foo_0 foo_1", &["vertex_weight=weight_0"], 1),
+            ("a_b_0", &["vertex_a_b=a_b_0"], 0),
+            ("foo_0 foo_1 foo_2 foo_3", &[], 1),
+            ("foo_1 foo_0", &[], 1),
+            ("foo_u foo_v foo_w", &[], 1),
+            ("foo", &[], 1),
+            ("r g", &[], 2),
+            (
+                "foo_0 r g b",
+                &["vertex_color=r,g,b", "vertex_foo=foo_0"],
+                0,
+            ),
+            (
+                "foo_0 bar_0 foo_1",
+                &["vertex_foo=foo_0", "vertex_bar=bar_0"],
+                1,
+            ),
+            ("r g b color_0 color_1 color_2", &["vertex_color=r,g,b"], 1),
+        ] {
+            assert_eq!(
+                planned(properties),
+                (wanted.iter().map(|w| w.to_string()).collect(), warnings),
+                "{properties}"
+            );
+        }
+    }
+}
