@@ -1,0 +1,157 @@
+//! How fast: rays against a bumpy sphere of half a million triangles, building its tree, and whole renders.
+//!
+//!     cargo bench                    # everything
+//!     cargo bench -- closest         # those with "closest" in their name
+//!
+//! Rays are traced by one thread, renders by all. Compare only what was measured in one run on one machine.
+
+use std::sync::{Arc, OnceLock};
+
+use divan::counter::ItemsCount;
+use divan::{Bencher, black_box};
+use etendue::accel::{Counts, Method, Tracer};
+use etendue::description::{self, Description};
+use etendue::interaction::{Hit, Ray};
+use etendue::math::{random, warp};
+use etendue::mesh;
+use etendue::render::{Colors, Options, Overrides, Silent, render};
+use etendue::shape::{Geometry, TriangleMesh};
+use glam::{Vec2, Vec3};
+
+fn main() {
+    divan::main();
+}
+
+/// Rays of a batch.
+const RAYS: u32 = 1 << 16;
+
+fn geometry() -> Vec<Arc<Geometry>> {
+    let mesh = mesh::bumpy_sphere(8, 1);
+    vec![Arc::new(Geometry::Mesh(TriangleMesh::new(mesh)))]
+}
+
+fn tracer() -> &'static Tracer {
+    static TRACER: OnceLock<Tracer> = OnceLock::new();
+    TRACER.get_or_init(|| Tracer::new(geometry(), &[0], Vec::new(), Method::Tree))
+}
+
+fn unit(seed: u64, i: u32) -> f32 {
+    random::unit(random::bits(seed, i))
+}
+
+fn direction(seed: u64, i: u32) -> Vec3 {
+    warp::uniform_sphere(Vec2::new(unit(seed, 2 * i), unit(seed, 2 * i + 1)))
+}
+
+/// From outside, side by side, as a camera's.
+fn primary() -> Vec<Ray> {
+    let side = 1 << 8;
+    let place = |i: u32| (i as f32 + 0.5) / side as f32 * 2.0 - 1.0;
+    (0..RAYS)
+        .map(|i| {
+            let origin = Vec3::new(0.0, 0.0, 4.0);
+            let target = Vec3::new(place(i % side), place(i / side), 0.0);
+            ray(origin, (target - origin).normalize(), f32::INFINITY)
+        })
+        .collect()
+}
+
+fn ray(origin: Vec3, direction: Vec3, t_max: f32) -> Ray {
+    Ray {
+        origin,
+        direction,
+        t_max,
+        time: 0.0,
+    }
+}
+
+/// From where the primary rays end, in all directions.
+fn incoherent() -> Vec<Ray> {
+    let rays = primary();
+    let mut hits = Vec::new();
+    tracer().closest(&rays, &mut hits, &mut Counts::default());
+    rays.iter()
+        .zip(&hits)
+        .filter(|(_, hit)| !hit.is_miss())
+        .enumerate()
+        .map(|(i, (ray, hit))| tracer().interaction(ray, hit).spawn(direction(2, i as u32)))
+        .collect()
+}
+
+/// From where the primary rays end, toward a light above.
+fn shadow() -> Vec<Ray> {
+    let light = Vec3::new(0.0, 5.0, 2.0);
+    let toward = |r: Ray| {
+        ray(
+            r.origin,
+            (light - r.origin).normalize(),
+            r.origin.distance(light),
+        )
+    };
+    incoherent().into_iter().map(toward).collect()
+}
+
+fn closest(bencher: Bencher<'_, '_>, rays: &[Ray]) {
+    let mut hits: Vec<Hit> = Vec::new();
+    bencher
+        .counter(ItemsCount::new(rays.len()))
+        .bench_local(|| tracer().closest(black_box(rays), &mut hits, &mut Counts::default()));
+}
+
+#[divan::bench(sample_count = 20)]
+fn closest_primary(bencher: Bencher<'_, '_>) {
+    closest(bencher, &primary());
+}
+
+#[divan::bench(sample_count = 20)]
+fn closest_incoherent(bencher: Bencher<'_, '_>) {
+    closest(bencher, &incoherent());
+}
+
+#[divan::bench(sample_count = 20)]
+fn occluded_shadow(bencher: Bencher<'_, '_>) {
+    let (rays, mut blocked) = (shadow(), Vec::new());
+    bencher
+        .counter(ItemsCount::new(rays.len()))
+        .bench_local(|| {
+            let rays = black_box(&rays).iter().copied();
+            tracer().occluded(rays, &mut blocked, &mut Counts::default());
+        });
+}
+
+#[divan::bench(sample_count = 5)]
+fn build_tree(bencher: Bencher<'_, '_>) {
+    let geometry = geometry();
+    bencher.bench_local(|| Tracer::new(geometry.clone(), &[0], Vec::new(), Method::Tree));
+}
+
+/// A scene of `scenes/`, small.
+#[divan::bench(args = ["cornell-box", "soft-shadow", "spheres"], sample_count = 5)]
+fn scene(bencher: Bencher<'_, '_>, name: &str) {
+    render_small(bencher, name, Colors::Rgb);
+}
+
+#[divan::bench(args = [8, 16, 32], sample_count = 5)]
+fn cornell_box_in_bands(bencher: Bencher<'_, '_>, bands: usize) {
+    render_small(bencher, "cornell-box", Colors::Bands(bands));
+}
+
+fn render_small(bencher: Bencher<'_, '_>, name: &str, colors: Colors) {
+    let path = format!("{}/scenes/{name}.xml", env!("CARGO_MANIFEST_DIR"));
+    let options = description::Options::default();
+    let mut description = Description::read(path.as_ref(), &options).expect("the scene is right");
+    let (spp, size) = (4, (128, 96));
+    Overrides {
+        spp: Some(spp),
+        size: Some(size),
+        ..Overrides::default()
+    }
+    .apply(&mut description);
+    let options = Options {
+        colors,
+        ..Options::default()
+    };
+    bencher
+        .counter(ItemsCount::new(spp * size.0 * size.1))
+        .bench_local(|| render(&description, &options, &Silent).expect("the scene is right"));
+}
