@@ -1,4 +1,4 @@
-//! How fast: rays against a bumpy sphere of half a million triangles, building its tree, and whole renders.
+//! How fast: rays against a bumpy sphere of 327,680 triangles, building its tree, and whole renders.
 //!
 //!     cargo bench                    # everything
 //!     cargo bench -- closest         # those with "closest" in their name
@@ -26,7 +26,7 @@ fn main() {
 const RAYS: u32 = 1 << 16;
 
 fn geometry() -> Vec<Arc<Geometry>> {
-    let mesh = mesh::bumpy_sphere(8, 1);
+    let mesh = mesh::bumpy_sphere(7, 1);
     vec![Arc::new(Geometry::Mesh(TriangleMesh::new(mesh)))]
 }
 
