@@ -2,6 +2,7 @@
 //! Whether the images are right is for `tools/test` to say.
 
 use std::fs;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -51,7 +52,12 @@ fn every_scene_of_mitsubas_renders_or_asks_for_what_is_not_there() {
     let data = at("../shared/data");
     let suite = data.join("mitsuba-data/tests/scenes");
     if !suite.is_dir() {
-        eprintln!("SKIPPED: {} is not here", suite.display());
+        // Past the capture of the test's output, so that it is seen.
+        let _ = writeln!(
+            std::io::stderr(),
+            "SKIPPED: {} is not here",
+            suite.display()
+        );
         return;
     }
     let folder = tempfile::tempdir().expect("a temporary folder");
