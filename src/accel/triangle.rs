@@ -6,6 +6,7 @@
 use glam::Vec3;
 
 use crate::interaction::Ray;
+use crate::math::offset::gamma;
 
 /// A ray prepared for triangles: the axis along which it mostly goes becomes z, and a shear makes it
 /// that axis.
@@ -40,7 +41,7 @@ impl Shear {
         }
     }
 
-    /// (t, u, v) with 0 < t ≤ `limit`; u and v are the second and third barycentric coordinates.
+    /// (t, u, v) with 0 < t ≤ `limit`, t certain to be positive; u and v are the second and third barycentric coordinates.
     #[inline]
     pub(super) fn intersect(&self, corners: [Vec3; 3], limit: f32) -> Option<(f32, f32, f32)> {
         let [x, y, z] = self.axes;
@@ -64,6 +65,21 @@ impl Shear {
         }
         let inverse = 1.0 / determinant;
         let t = (u * a.2 + v * b.2 + w * c.2) * self.shear[2] * inverse;
-        (t > 0.0 && t <= limit).then_some((t, v * inverse, w * inverse))
+        let least = self.distance_error([a, b, c], [u, v, w]) * inverse.abs();
+        (t > least && t <= limit).then_some((t, v * inverse, w * inverse))
+    }
+
+    /// A bound on the rounding error of t times the determinant: a hit that is nearer than this may be
+    /// the very surface that the ray leaves (Pharr, Jakob and Humphreys, *PBRT* 4th ed., 6.8.7).
+    #[inline]
+    fn distance_error(&self, [a, b, c]: [(f32, f32, f32); 3], edges: [f32; 3]) -> f32 {
+        let largest = |x: f32, y: f32, z: f32| x.abs().max(y.abs()).max(z.abs());
+        let x = largest(a.0, b.0, c.0);
+        let y = largest(a.1, b.1, c.1);
+        let z = largest(a.2, b.2, c.2);
+        let edge = largest(edges[0], edges[1], edges[2]);
+        let (dx, dy) = (gamma(5) * (x + z), gamma(5) * (y + z));
+        let de = 2.0 * (gamma(2) * x * y + dy * x + dx * y);
+        3.0 * (gamma(3) * edge * z + de * z + gamma(3) * z * edge) * self.shear[2].abs()
     }
 }

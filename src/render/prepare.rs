@@ -162,7 +162,6 @@ impl<C: ColorModel> Job<C> {
             .with("integrator", self.integrator_name.as_str())
             .with("spp", report.spp)
             .with("seed", i64::try_from(report.seed).unwrap_or(i64::MAX))
-            .with("seconds", report.seconds.render)
             .with("world_to_camera", to_camera)
             .with("world_to_ndc", self.sensor.projection() * to_camera)
     }
