@@ -37,7 +37,7 @@ pub struct Estimate<S> {
 }
 
 /// What light transport costs, counted.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Stats {
     /// Rays from the camera.
     pub camera_rays: u64,
