@@ -106,6 +106,26 @@ pub struct Interaction<'s> {
 }
 
 impl Interaction<'_> {
+    /// A point of no shape with these texture coordinates, seen along its normal +z.
+    pub fn at_uv(uv: Vec2) -> Self {
+        Self {
+            t: 1.0,
+            position: Vec3::ZERO,
+            error: Vec3::ZERO,
+            normal: Vec3::Z,
+            frame: Frame::around(Vec3::Z),
+            uv,
+            dp_du: Vec3::X,
+            dp_dv: Vec3::Y,
+            wi: Vec3::Z,
+            time: 0.0,
+            shape: Hit::NONE,
+            primitive: 0,
+            mesh: None,
+            barycentric: Vec2::ZERO,
+        }
+    }
+
     /// A ray from here toward `direction` (unit length), off the surface by its rounding error.
     pub fn spawn(&self, direction: Vec3) -> Ray {
         let origin = offset::offset(self.position, self.error, self.normal, direction);

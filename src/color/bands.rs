@@ -135,7 +135,7 @@ impl<const N: usize> ColorModel for Bands<N> {
                         sigmoid: fit(rgb),
                         illuminant: false,
                     },
-                    Role::Emission | Role::Quantity => {
+                    Role::Emission | Role::Quantity | Role::Tabulated => {
                         let (scale, rgb) = scaled(rgb);
                         Spectrum::Upsampled {
                             scale,
@@ -170,7 +170,7 @@ impl<const N: usize> ColorModel for Bands<N> {
     fn texel(&self, rgb: [f32; 3], role: Role) -> SpectralTexel {
         let (scale, rgb) = match role {
             Role::Reflectance => (1.0, rgb.map(|v| v.clamp(0.0, 1.0))),
-            Role::Emission | Role::Quantity => scaled(rgb),
+            Role::Emission | Role::Quantity | Role::Tabulated => scaled(rgb),
         };
         let sigmoid = Table::shared().lookup(rgb);
         SpectralTexel {

@@ -28,6 +28,8 @@ pub enum Role {
     Emission,
     /// Another physical quantity over wavelength, unbounded: an index of refraction.
     Quantity,
+    /// A quantity from Mitsuba's tables of metals, whose RGB is that of light with this spectrum.
+    Tabulated,
 }
 
 /// RGB or N bands.

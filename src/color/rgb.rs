@@ -1,5 +1,5 @@
 //! Three channels of linear BT.709. Spectral curves are integrated against the CIE observer while the
-//! scene is built, as Mitsuba's RGB variants do: emission as it is, reflectance under D65.
+//! scene is built, as Mitsuba's RGB variants do: emission as it is, other quantities under D65.
 
 use super::cie;
 use super::d65::d65;
@@ -30,13 +30,10 @@ impl ColorModel for Rgb {
             Color::Flat(value) => [*value; 3],
             Color::Curve(points) => {
                 let rgb = match role {
-                    Role::Reflectance => integrate(|l| curve(points, l) * f64::from(d65(l as f32))),
-                    Role::Emission => integrate(|l| curve(points, l)),
-                    // An index of refraction 1 at all wavelengths is 1 in each channel.
-                    Role::Quantity => {
-                        let (value, one) = (integrate(|l| curve(points, l)), integrate(|_| 1.0));
-                        std::array::from_fn(|i| value[i] / one[i])
+                    Role::Reflectance | Role::Quantity => {
+                        integrate(|l| curve(points, l) * f64::from(d65(l as f32)))
                     }
+                    Role::Emission | Role::Tabulated => integrate(|l| curve(points, l)),
                 };
                 if role == Role::Reflectance {
                     rgb.map(|v| v.clamp(0.0, 1.0))

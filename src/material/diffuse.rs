@@ -4,7 +4,7 @@ use std::f32::consts::FRAC_1_PI;
 
 use glam::{Vec2, Vec3};
 
-use super::{Bsdf, BsdfSample, BsdfValue};
+use super::{Bsdf, BsdfSample, BsdfValue, Lobes};
 use crate::color::{Color, ColorModel, Role, Spectral};
 use crate::description::Properties;
 use crate::error::Result;
@@ -43,8 +43,8 @@ impl<C: ColorModel> Diffuse<C> {
 }
 
 impl<C: ColorModel> Bsdf<C> for Diffuse<C> {
-    fn is_smooth(&self) -> bool {
-        true
+    fn lobes(&self) -> Lobes {
+        Lobes::REFLECTION
     }
 
     fn eval(

@@ -2,17 +2,27 @@
 //! `wi` points to where the path came from, `wo` to where it goes on. Values include the cosine:
 //! f(wi, wo)·|cos θ_o|.
 
+mod blendbsdf;
+mod conductor;
+mod dielectric;
 mod diffuse;
+mod mask;
+mod null;
+mod plastic;
+mod thindielectric;
 mod twosided;
+
+mod fresnel;
+mod ior;
 
 use glam::{Vec2, Vec3};
 
-use crate::color::ColorModel;
+use crate::color::{ColorModel, Mono, Spectral};
 use crate::description::{Kind, Properties};
 use crate::error::Result;
 use crate::family::family;
 use crate::interaction::Interaction;
-use crate::texture::Palettes;
+use crate::texture::{Palettes, Texture};
 
 /// A direction drawn from a BSDF.
 #[derive(Clone, Copy, Debug)]
@@ -38,10 +48,64 @@ pub struct BsdfValue<S> {
     pub pdf: f32,
 }
 
+impl<S> BsdfSample<S> {
+    /// Straight on through the surface, chosen with that probability.
+    fn passing(wi: Vec3, probability: f32, weight: S) -> Self {
+        Self {
+            wo: -wi,
+            weight,
+            pdf: probability,
+            eta: 1.0,
+            delta: true,
+        }
+    }
+}
+
+impl<S: Spectral> BsdfValue<S> {
+    /// The sample that drew `wo` with this density; `None` where that is 0.
+    fn as_sample(self, wo: Vec3, eta: f32) -> Option<BsdfSample<S>> {
+        let usable = self.pdf > 0.0 && self.pdf.is_finite();
+        usable.then(|| BsdfSample {
+            wo,
+            weight: self.value / self.pdf,
+            pdf: self.pdf,
+            eta,
+            delta: false,
+        })
+    }
+}
+
+/// The ways in which a material scatters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Lobes {
+    /// Into more than single directions, so that sampling lights pays.
+    pub smooth: bool,
+    /// Through the surface.
+    pub transmission: bool,
+}
+
+impl Lobes {
+    /// Reflection into many directions.
+    const REFLECTION: Self = Self {
+        smooth: true,
+        transmission: false,
+    };
+    /// Reflection into single directions.
+    const MIRROR: Self = Self {
+        smooth: false,
+        transmission: false,
+    };
+}
+
 /// What every material does. `Option`: `None` is black with density 0.
 pub trait Bsdf<C: ColorModel>: std::fmt::Debug + Send + Sync {
+    /// The ways in which it scatters anywhere.
+    fn lobes(&self) -> Lobes;
+
     /// Whether it scatters into more than single directions, so that sampling lights pays.
-    fn is_smooth(&self) -> bool;
+    fn is_smooth(&self) -> bool {
+        self.lobes().smooth
+    }
 
     /// The value and density of a pair of directions.
     fn eval(
@@ -51,6 +115,12 @@ pub trait Bsdf<C: ColorModel>: std::fmt::Debug + Send + Sync {
         wo: Vec3,
         wavelengths: &C::Wavelengths,
     ) -> Option<BsdfValue<C::Sample>>;
+
+    /// The diffuse reflectance, for the channel that shows it: π·f seen and lit along the normal.
+    fn albedo(&self, at: &Interaction<'_>, wavelengths: &C::Wavelengths) -> C::Sample {
+        let straight = self.eval(at, Vec3::Z, Vec3::Z, wavelengths);
+        straight.map_or(C::Sample::zero(), |v| v.value * std::f32::consts::PI)
+    }
 
     /// Draws `wo`: `u1` chooses the lobe, `u2` the direction.
     fn sample(
@@ -67,7 +137,14 @@ family! {
     /// Every material there is.
     #[derive(Clone, Debug)]
     pub enum Material<C>: Bsdf, kind "bsdf", context Palettes<C> {
+        "blendbsdf" => BlendBsdf(blendbsdf::BlendBsdf<C>),
+        "conductor" => Conductor(conductor::Conductor<C>),
+        "dielectric" => Dielectric(dielectric::Dielectric<C>),
         "diffuse" => Diffuse(diffuse::Diffuse<C>),
+        "mask" => Mask(mask::Mask<C>),
+        "null" => Null(null::Null),
+        "plastic" => Plastic(plastic::Plastic<C>),
+        "thindielectric" => ThinDielectric(thindielectric::ThinDielectric<C>),
         "twosided" => TwoSided(twosided::TwoSided<C>),
     }
 }
@@ -109,6 +186,27 @@ fn nested<C: ColorModel>(
         .iter()
         .map(|child| Material::build(child, palettes))
         .collect()
+}
+
+/// The texture's number, clamped to [0, 1].
+fn fraction(texture: &Texture<Mono>, at: &Interaction<'_>) -> f32 {
+    texture.eval(at, &())[0].clamp(0.0, 1.0)
+}
+
+/// The mean of a colour over texture coordinates and channels, by some samples: for choosing lobes.
+fn mean<C: ColorModel>(palettes: &Palettes<C>, texture: &Texture<C>) -> f32 {
+    const STEPS: u16 = 16;
+    let color = &palettes.colors.color;
+    let channels: f32 = (0..C::Sample::LANES).map(|i| color.unit()[i]).sum();
+    let step = |i: u16| (f32::from(i) + 0.5) / f32::from(STEPS);
+    let mut sum = 0.0;
+    for i in 0..STEPS * STEPS {
+        let uv = Vec2::new(step(i % STEPS), step(i / STEPS));
+        let wavelengths = color.wavelengths(step(i % STEPS));
+        let value = texture.eval(&Interaction::at_uv(uv), &wavelengths) * color.unit();
+        sum += (0..C::Sample::LANES).map(|c| value[c]).sum::<f32>();
+    }
+    sum / (channels * f32::from(STEPS * STEPS))
 }
 
 #[cfg(test)]

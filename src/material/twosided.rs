@@ -2,7 +2,7 @@
 
 use glam::{Vec2, Vec3};
 
-use super::{Bsdf, BsdfSample, BsdfValue, Material, nested};
+use super::{Bsdf, BsdfSample, BsdfValue, Lobes, Material, nested};
 use crate::color::ColorModel;
 use crate::description::Properties;
 use crate::error::Result;
@@ -19,9 +19,15 @@ pub struct TwoSided<C: ColorModel> {
 
 impl<C: ColorModel> TwoSided<C> {
     pub(super) fn build(properties: &Properties<'_>, palettes: &Palettes<C>) -> Result<Self> {
-        let mut sides = nested(properties, palettes, 1..=2)?
-            .into_iter()
-            .map(Box::new);
+        let sides = nested(properties, palettes, 1..=2)?;
+        if sides.iter().any(|side| side.lobes().transmission) {
+            let message =
+                "twosided takes materials that only reflect, and one of these transmits light";
+            return Err(properties
+                .error("", message)
+                .help("put the twosided inside the mask or blendbsdf, not around it"));
+        }
+        let mut sides = sides.into_iter().map(Box::new);
         let front = sides.next().expect("there is at least one");
         Ok(Self {
             front,
@@ -42,8 +48,12 @@ impl<C: ColorModel> TwoSided<C> {
 const FLIP: Vec3 = Vec3::new(1.0, 1.0, -1.0);
 
 impl<C: ColorModel> Bsdf<C> for TwoSided<C> {
-    fn is_smooth(&self) -> bool {
-        self.front.is_smooth() || self.back.as_ref().is_some_and(|b| b.is_smooth())
+    fn lobes(&self) -> Lobes {
+        let back = self.back.as_ref().map(|b| b.lobes());
+        Lobes {
+            smooth: self.front.is_smooth() || back.is_some_and(|b| b.smooth),
+            transmission: false,
+        }
     }
 
     fn eval(

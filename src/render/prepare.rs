@@ -15,7 +15,7 @@ use crate::color::ColorModel;
 use crate::description::{Description, Kind, NodeId, Properties};
 use crate::error::{Error, Problem, Problems, Result};
 use crate::image::{Metadata, Window};
-use crate::integrator::Integrator;
+use crate::integrator::{Estimator, Integrator};
 use crate::sampler::Sampler;
 use crate::scene::{self, Assets, Scene};
 use crate::sensor::{Film, Sensor};
@@ -190,9 +190,9 @@ pub(super) fn prepare<'k, C: ColorModel>(
     };
     let sensor = problems.take(sensor(description, options));
     let view = sensor.and_then(|sensor| problems.take(view::<C>(description, sensor)));
-    let film = view
-        .as_ref()
-        .map_or(0, |view| memory::film(&view.film, channels(&color).len()));
+    let film = view.as_ref().map_or(0, |view| {
+        memory::film(&view.film, channels(&color, &view.integrator).len())
+    });
     if kept.as_ref().is_some_and(|kept| kept.key == key) {
         // The equal scene was built from the equal properties, all of them.
         for property in description.root().all() {
@@ -240,17 +240,18 @@ pub(super) fn prepare<'k, C: ColorModel>(
     })
 }
 
-/// The sums' channels: the colours and, last, opacity.
-fn channels<C: ColorModel>(color: &C) -> Vec<String> {
+/// The sums' channels: the colours, the integrator's own and, last, opacity.
+fn channels<C: ColorModel>(color: &C, integrator: &Integrator<C>) -> Vec<String> {
     let mut channels = color.channels();
+    channels.extend(integrator.extra_channels());
     channels.push("A".into());
     channels
 }
 
 impl<C: ColorModel> Job<'_, C> {
-    /// The sums' channels: the colours and, last, opacity.
+    /// The sums' channels: the colours, the integrator's own and, last, opacity.
     pub(super) fn channels(&self) -> Vec<String> {
-        channels(self.scene.color())
+        channels(self.scene.color(), &self.view.integrator)
     }
 
     /// What the image depends on.
@@ -303,7 +304,6 @@ impl<C: ColorModel> Job<'_, C> {
             .with("spp", report.spp)
             .with("samples_complete", report.completed.samples)
             .with("seed", i64::try_from(report.seed).unwrap_or(i64::MAX))
-            .with("seconds", report.seconds.render)
             .with("world_to_camera", to_camera)
             .with("world_to_ndc", self.view.sensor.projection() * to_camera)
     }

@@ -14,7 +14,7 @@ use super::prepare::Job;
 use super::progress::{Phase, Progress};
 use super::sums::{Sums, border};
 use crate::color::ColorModel;
-use crate::integrator::{Estimate, Start};
+use crate::integrator::{Estimates, Estimator, Start};
 use crate::sampler::Stream;
 use crate::sensor::Window;
 
@@ -110,7 +110,11 @@ fn render_unit<C: ColorModel>(
     let batch = BATCH_BYTES / size_of::<Start<C>>() / 4;
     let mut starts: Vec<Start<C>> = Vec::with_capacity(batch);
     let mut places: Vec<([u32; 2], Vec2)> = Vec::with_capacity(batch);
-    let mut estimates: Vec<Estimate<C::Sample>> = Vec::new();
+    let mut estimates = Estimates {
+        values: Vec::new(),
+        extra: Vec::new(),
+    };
+    let extra = job.view.integrator.extra_channels().len();
     let mut row = vec![0.0; channels.len()];
     let mut flush = |starts: &mut Vec<Start<C>>, places: &mut Vec<([u32; 2], Vec2)>| {
         let before = sums.stats.rays();
@@ -118,12 +122,14 @@ fn render_unit<C: ColorModel>(
         job.view
             .integrator
             .estimate(scene, sampler, starts, &mut estimates, &mut sums.stats);
-        for ((start, estimate), (pixel, offset)) in starts.iter().zip(&estimates).zip(places.iter())
-        {
+        for (i, (start, (pixel, offset))) in starts.iter().zip(places.iter()).enumerate() {
+            let estimate = &estimates.values[i];
             scene
                 .color()
                 .develop(&estimate.radiance, &start.wavelengths, &mut row);
-            row[channels.len() - 1] = estimate.alpha;
+            let opacity = channels.len() - 1;
+            row[opacity - extra..opacity].copy_from_slice(&estimates.extra[i * extra..][..extra]);
+            row[opacity] = estimate.alpha;
             sums.splat(&film.filter, *pixel, *offset, &row);
         }
         progress.advance(starts.len() as u64, sums.stats.rays() - before);

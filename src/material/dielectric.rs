@@ -1,0 +1,84 @@
+//! `dielectric`: the clear boundary of two media, such as glass (`int_ior`, bk7 by default) in air
+//! (`ext_ior`). It reflects the Fresnel share and refracts the rest, whose radiance changes by 1/η².
+//! `specular_reflectance` and `specular_transmittance` (1) multiply.
+
+use glam::{Vec2, Vec3};
+
+use super::{Bsdf, BsdfSample, BsdfValue, Lobes, fresnel, ior};
+use crate::color::{Color, ColorModel, Role};
+use crate::description::Properties;
+use crate::error::Result;
+use crate::interaction::Interaction;
+use crate::texture::{Palettes, Texture};
+
+/// A clear boundary.
+#[derive(Clone, Debug)]
+pub struct Dielectric<C: ColorModel> {
+    /// Index of refraction, inside over outside.
+    eta: f32,
+    specular_reflectance: Texture<C>,
+    specular_transmittance: Texture<C>,
+}
+
+impl<C: ColorModel> Dielectric<C> {
+    pub(super) fn build(properties: &Properties<'_>, palettes: &Palettes<C>) -> Result<Self> {
+        let factor = |name| {
+            let one = Color::Grey(1.0);
+            palettes
+                .colors
+                .texture(properties, name, Role::Reflectance, one)
+        };
+        Ok(Self {
+            eta: ior::relative(properties, "bk7")?,
+            specular_reflectance: factor("specular_reflectance")?,
+            specular_transmittance: factor("specular_transmittance")?,
+        })
+    }
+}
+
+impl<C: ColorModel> Bsdf<C> for Dielectric<C> {
+    fn lobes(&self) -> Lobes {
+        Lobes {
+            smooth: false,
+            transmission: true,
+        }
+    }
+
+    fn eval(
+        &self,
+        _at: &Interaction<'_>,
+        _wi: Vec3,
+        _wo: Vec3,
+        _w: &C::Wavelengths,
+    ) -> Option<BsdfValue<C::Sample>> {
+        None
+    }
+
+    fn sample(
+        &self,
+        at: &Interaction<'_>,
+        wi: Vec3,
+        u1: f32,
+        _u2: Vec2,
+        w: &C::Wavelengths,
+    ) -> Option<BsdfSample<C::Sample>> {
+        let boundary = fresnel::dielectric(wi.z, self.eta);
+        Some(if u1 < boundary.reflectance {
+            BsdfSample {
+                wo: fresnel::mirror(wi),
+                weight: self.specular_reflectance.eval(at, w),
+                pdf: boundary.reflectance,
+                eta: 1.0,
+                delta: true,
+            }
+        } else {
+            BsdfSample {
+                wo: fresnel::refract(wi, Vec3::Z, &boundary),
+                weight: self.specular_transmittance.eval(at, w) / (boundary.eta * boundary.eta),
+                pdf: 1.0 - boundary.reflectance,
+                eta: boundary.eta,
+                delta: true,
+            }
+        })
+    }
+}

@@ -1,0 +1,80 @@
+//! `thindielectric`: a clear pane so thin that light leaves it where it entered: all the reflections
+//! inside add up, R = 2F / (1 + F) (Born and Wolf, *Principles of Optics*), and what passes goes straight
+//! on. `int_ior` is bk7 glass and `ext_ior` air by default; `specular_reflectance` and
+//! `specular_transmittance` (1) multiply.
+
+use glam::{Vec2, Vec3};
+
+use super::{Bsdf, BsdfSample, BsdfValue, Lobes, fresnel, ior};
+use crate::color::{Color, ColorModel, Role};
+use crate::description::Properties;
+use crate::error::Result;
+use crate::interaction::Interaction;
+use crate::texture::{Palettes, Texture};
+
+/// A thin clear pane.
+#[derive(Clone, Debug)]
+pub struct ThinDielectric<C: ColorModel> {
+    /// Index of refraction, inside over outside.
+    eta: f32,
+    specular_reflectance: Texture<C>,
+    specular_transmittance: Texture<C>,
+}
+
+impl<C: ColorModel> ThinDielectric<C> {
+    pub(super) fn build(properties: &Properties<'_>, palettes: &Palettes<C>) -> Result<Self> {
+        let factor = |name| {
+            let one = Color::Grey(1.0);
+            palettes
+                .colors
+                .texture(properties, name, Role::Reflectance, one)
+        };
+        Ok(Self {
+            eta: ior::relative(properties, "bk7")?,
+            specular_reflectance: factor("specular_reflectance")?,
+            specular_transmittance: factor("specular_transmittance")?,
+        })
+    }
+}
+
+impl<C: ColorModel> Bsdf<C> for ThinDielectric<C> {
+    fn lobes(&self) -> Lobes {
+        Lobes {
+            smooth: false,
+            transmission: true,
+        }
+    }
+
+    fn eval(
+        &self,
+        _at: &Interaction<'_>,
+        _wi: Vec3,
+        _wo: Vec3,
+        _w: &C::Wavelengths,
+    ) -> Option<BsdfValue<C::Sample>> {
+        None
+    }
+
+    fn sample(
+        &self,
+        at: &Interaction<'_>,
+        wi: Vec3,
+        u1: f32,
+        _u2: Vec2,
+        w: &C::Wavelengths,
+    ) -> Option<BsdfSample<C::Sample>> {
+        let once = fresnel::dielectric(wi.z.abs(), self.eta).reflectance;
+        let reflectance = once * 2.0 / (1.0 + once);
+        if u1 < reflectance {
+            return Some(BsdfSample {
+                wo: fresnel::mirror(wi),
+                weight: self.specular_reflectance.eval(at, w),
+                pdf: reflectance,
+                eta: 1.0,
+                delta: true,
+            });
+        }
+        let weight = self.specular_transmittance.eval(at, w);
+        Some(BsdfSample::passing(wi, 1.0 - reflectance, weight))
+    }
+}
