@@ -4,6 +4,8 @@
 //! 3 the system refused (a file that cannot be read or written); 130 stopped by a signal, after writing
 //! what was complete. Of several images the gravest counts.
 
+mod check;
+mod info;
 mod render;
 
 mod batch;
@@ -34,12 +36,16 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     Render(Box<render::Arguments>),
+    Check(check::Arguments),
+    Info(info::Arguments),
 }
 
 /// Runs the command that the arguments name.
 pub(crate) fn run() -> ExitCode {
     let result = match Arguments::parse().command {
         Command::Render(arguments) => render::run(&arguments),
+        Command::Check(arguments) => check::run(&arguments),
+        Command::Info(arguments) => info::run(&arguments),
     };
     match result {
         Ok(status) => ExitCode::from(status),

@@ -9,7 +9,7 @@ use etendue::accel::Method;
 use etendue::description::{self, Description, Value};
 use etendue::display;
 use etendue::error::{Error, Problem, Result};
-use etendue::render::{Checkpoint, Colors, Options, Overrides, Rendered, Session};
+use etendue::render::{Checkpoint, Colors, Options, Overrides, Rendered, Session, is_mesh};
 use etendue::sensor::Window;
 use glam::DMat4;
 
@@ -239,7 +239,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
 struct Series<'a> {
     arguments: &'a Arguments,
     session: Session,
-    /// The input that was read last, and how: frames of a mesh need it but once.
+    /// The bare mesh that was read last, and how: its frames need it read but once.
     read: Option<(PathBuf, description::Options, Description)>,
     /// Warnings that were told already.
     told: Vec<Problem>,
@@ -280,19 +280,21 @@ impl Series<'_> {
     ) -> Result<Rendered> {
         let sensor = sensors(&description).get(item.sensor).copied();
         let turned = self.arguments.turntable.zip(item.frame).zip(sensor);
+        let mut pose = None;
         if let Some(((count, frame), sensor)) = turned {
             let bounds = self.session.bounds(&description, options, bar)?;
-            let pose = description.get(sensor, "to_world").cloned();
+            let before = description.get(sensor, "to_world").cloned();
+            pose = Some(before.unwrap_or(Value::Transform(DMat4::IDENTITY))).map(|p| (sensor, p));
             let turns = frame as f64 / f64::from(count);
             turn(&mut description, sensor, &bounds, turns);
-            let rendered = self.session.render(&description, options, bar);
-            let pose = pose.unwrap_or(Value::Transform(DMat4::IDENTITY));
-            description.set(sensor, "to_world", pose);
-            self.read = Some((item.input.clone(), as_read, description));
-            return rendered;
         }
         let rendered = self.session.render(&description, options, bar);
-        self.read = Some((item.input.clone(), as_read, description));
+        if is_mesh(&item.input) {
+            if let Some((sensor, pose)) = pose {
+                description.set(sensor, "to_world", pose);
+            }
+            self.read = Some((item.input.clone(), as_read, description));
+        }
         rendered
     }
 
@@ -300,7 +302,7 @@ impl Series<'_> {
     fn read(&mut self, item: &Item) -> Result<(description::Options, Description)> {
         let scene = &self.arguments.scene;
         // A bare mesh has no parameters, and reading it takes time.
-        let bare = etendue::render::is_mesh(&item.input);
+        let bare = is_mesh(&item.input);
         let options = scene.options(item.frame.filter(|_| !bare));
         if let Some((input, as_read, description)) = self.read.take()
             && input == item.input

@@ -6,8 +6,10 @@ mod options;
 mod progress;
 
 mod bare;
+mod check;
 mod checkpoint;
 mod fingerprint;
+mod info;
 mod memory;
 mod plan;
 mod prepare;
@@ -25,7 +27,9 @@ use crate::image::{Image, Metadata, Window};
 use crate::integrator::Stats;
 
 pub use bare::{UpAxis, describe_mesh, is_mesh};
+pub use check::check;
 pub use checkpoint::Checkpoint;
+pub use info::{NamedFile, SceneInfo, SensorInfo};
 pub use memory::human_bytes;
 pub use options::{Colors, Options, Overrides};
 pub use plan::Completed;
@@ -114,3 +118,6 @@ pub fn human_duration(duration: Duration) -> String {
         s => format!("{} h {} min", s / 3600, s % 3600 / 60),
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -42,10 +42,11 @@ struct Key {
 #[derive(Clone, Debug)]
 pub(super) struct Facts {
     pub(super) primitives: u64,
+    pub(super) instances: usize,
     pub(super) bounds: Bounds,
     /// Bytes of geometry and of trees.
     pub(super) bytes: [usize; 2],
-    warnings: Vec<Problem>,
+    pub(super) warnings: Vec<Problem>,
 }
 
 /// What a scene is looked at with.
@@ -164,6 +165,7 @@ fn make<C: ColorModel>(
     progress.advance(1, 0);
     let facts = Facts {
         primitives,
+        instances: scene.tracer().instance_count(),
         bounds: scene.tracer().bounds(),
         bytes: [assets.bytes(), scene.tracer().tree_bytes()],
         warnings: assets.warnings().to_vec(),

@@ -9,7 +9,7 @@ use rayon::ThreadPool;
 use super::checkpoint::Keeper;
 use super::options::{Colors, Options};
 use super::plan::Plan;
-use super::prepare::{self, Job, Kept};
+use super::prepare::{self, Facts, Job, Kept};
 use super::progress::Progress;
 use super::sums::Sums;
 use super::unit::{self, Summed};
@@ -64,13 +64,13 @@ struct Ask<'a> {
     progress: &'a dyn Progress,
 }
 
-/// Makes sure that the scene is in memory and tells its box.
+/// Makes sure that the scene is in memory and tells of it.
 struct Measure<'a>(Ask<'a>);
 
 impl Task for Measure<'_> {
-    type Output = Bounds;
+    type Output = Facts;
 
-    fn run<C: ColorModel>(self, color: C) -> Result<Bounds> {
+    fn run<C: ColorModel>(self, color: C) -> Result<Facts> {
         let Ask {
             kept,
             description,
@@ -79,7 +79,10 @@ impl Task for Measure<'_> {
         } = self.0;
         let mut seconds = Seconds::default();
         let job = prepare::prepare(kept, description, options, color, progress, &mut seconds)?;
-        Ok(job.facts.bounds)
+        Ok(Facts {
+            warnings: job.warnings,
+            ..job.facts.clone()
+        })
     }
 }
 
@@ -170,6 +173,16 @@ impl Session {
         options: &Options,
         progress: &dyn Progress,
     ) -> Result<Bounds> {
+        Ok(self.contents(description, options, progress)?.bounds)
+    }
+
+    /// What is known of the scene once it is in memory.
+    pub(super) fn contents(
+        &mut self,
+        description: &Description,
+        options: &Options,
+        progress: &dyn Progress,
+    ) -> Result<Facts> {
         self.run(options, |kept| {
             let ask = Ask {
                 kept,

@@ -3,9 +3,11 @@
 
 mod support;
 
+mod cli;
 mod closed_form;
 mod golden;
 mod inputs;
 mod layers;
 mod mitsuba_data;
+mod resume;
 mod same_bits;

@@ -1,0 +1,75 @@
+//! `etendue check`: everything that is wrong with scenes, without rendering them.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use etendue::error::{Problem, Result};
+use etendue::render::{self, Options, Silent};
+use serde_json::json;
+
+use super::scene::SceneArguments;
+use super::{output, report, status};
+
+/// Find everything that is wrong with scenes, without rendering
+///
+/// Meshes and images are loaded, and all sensors, materials and lights are built. What is wrong goes to
+/// standard error, with the line that says it.
+#[derive(Args, Debug)]
+#[command(after_help = status::HELP)]
+pub(super) struct Arguments {
+    /// Scene files (.xml) or meshes
+    #[arg(required = true, value_name = "SCENE")]
+    inputs: Vec<PathBuf>,
+    #[command(flatten)]
+    scene: SceneArguments,
+    /// Print a JSON object for each scene: ok, problems, warnings
+    #[arg(long)]
+    json: bool,
+    /// No word on scenes that are in order, no warnings
+    #[arg(short, long)]
+    quiet: bool,
+}
+
+/// Runs the command; the answer is the exit status.
+pub(super) fn run(arguments: &Arguments) -> Result<u8> {
+    let mut worst = status::DONE;
+    for input in &arguments.inputs {
+        let result = check(arguments, input);
+        let name = input.display().to_string();
+        if arguments.json {
+            let none = Vec::new();
+            let (problems, warnings) = match &result {
+                Ok(warnings) => (&[][..], warnings),
+                Err(error) => (error.problems(), &none),
+            };
+            let object = json!({
+                "scene": name,
+                "ok": result.is_ok(),
+                "problems": report::json(problems),
+                "warnings": report::json(warnings),
+            });
+            output::line(&object.to_string());
+        }
+        match &result {
+            Err(error) => {
+                if !arguments.json {
+                    report::error(error);
+                }
+                worst = worst.max(status::of(error));
+            }
+            Ok(warnings) if !arguments.json && !arguments.quiet => {
+                report::warnings(warnings);
+                output::line(&format!("{name}: in order"));
+            }
+            Ok(_) => {}
+        }
+    }
+    Ok(worst)
+}
+
+/// The warnings.
+fn check(arguments: &Arguments, input: &Path) -> Result<Vec<Problem>> {
+    let scene = &arguments.scene;
+    let description = scene.describe(input, &scene.options(None))?;
+    render::check(&description, &Options::default(), &Silent)
+}

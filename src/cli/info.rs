@@ -1,0 +1,218 @@
+//! `etendue info`: what scenes, meshes and images hold.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use etendue::error::Result;
+use etendue::image::{self, Encoding, Limits, Picture};
+use etendue::mesh::{self, Per, ReadOptions};
+use etendue::render::{Options, SceneInfo, Session, Silent, human_bytes};
+use serde_json::{Value, json};
+
+use super::scene::{SceneArguments, is_scene};
+use super::{output, report, status};
+
+/// Print what scenes, meshes and images hold
+///
+/// A scene is loaded and its trees are built: plugins, primitives, bounds and bytes are those of a render.
+#[derive(Args, Debug)]
+#[command(after_help = status::HELP)]
+pub(super) struct Arguments {
+    /// Scenes (.xml), meshes (.ply, .obj, .stl, .serialized, .gltf, .glb) or images
+    #[arg(required = true, value_name = "FILE")]
+    inputs: Vec<PathBuf>,
+    #[command(flatten)]
+    scene: SceneArguments,
+    /// Print a JSON object for each file
+    #[arg(long)]
+    json: bool,
+    /// No warnings
+    #[arg(short, long)]
+    quiet: bool,
+}
+
+/// Runs the command; the answer is the exit status.
+pub(super) fn run(arguments: &Arguments) -> Result<u8> {
+    let mut worst = status::DONE;
+    for input in &arguments.inputs {
+        let mut object = match info(arguments, input) {
+            Ok(object) => object,
+            Err(error) => {
+                report::error(&error);
+                worst = worst.max(status::of(&error));
+                continue;
+            }
+        };
+        if arguments.json {
+            object["file"] = input.display().to_string().into();
+            output::line(&object.to_string());
+        } else {
+            output::line(&input.display().to_string());
+            print(&object, 1);
+        }
+    }
+    Ok(worst)
+}
+
+fn info(arguments: &Arguments, input: &Path) -> Result<Value> {
+    let extension = input.extension().unwrap_or_default().to_string_lossy();
+    let extension = extension.to_lowercase();
+    let is_mesh = mesh::FORMATS
+        .iter()
+        .any(|format| format.extensions.contains(&extension.as_str()));
+    if is_scene(input) {
+        scene(arguments, input)
+    } else if is_mesh {
+        mesh_file(arguments, input)
+    } else {
+        Ok(picture(&image::read(input, &Limits::default())?))
+    }
+}
+
+fn scene(arguments: &Arguments, input: &Path) -> Result<Value> {
+    let scene = &arguments.scene;
+    let description = scene.describe(input, &scene.options(None))?;
+    let info = Session::default().info(&description, &Options::default(), &Silent)?;
+    if !arguments.quiet {
+        report::warnings(&info.warnings);
+    }
+    let SceneInfo { files, .. } = &info;
+    let bytes: u64 = files.iter().map(|f| f.bytes).sum();
+    let mut object = serde_json::to_value(&info).expect("it has only names and numbers");
+    object["kind"] = "scene".into();
+    object["file_bytes"] = bytes.into();
+    Ok(object)
+}
+
+fn mesh_file(arguments: &Arguments, input: &Path) -> Result<Value> {
+    let loaded = mesh::read(input, &ReadOptions::default())?;
+    if !arguments.quiet {
+        report::warnings(&loaded.warnings);
+    }
+    let mesh = &loaded.mesh;
+    let attributes: Vec<Value> = mesh
+        .attributes
+        .iter()
+        .map(|attribute| {
+            json!({
+                "name": attribute.name,
+                "channels": attribute.channels,
+                "per": match attribute.per {
+                    Per::Vertex => "vertex",
+                    Per::Face => "face",
+                },
+            })
+        })
+        .collect();
+    let bounds = mesh
+        .bounds()
+        .map(|(low, high)| [low.to_array(), high.to_array()]);
+    Ok(json!({
+        "kind": "mesh",
+        "triangles": mesh.triangles.len(),
+        "dropped_triangles": loaded.dropped_triangles,
+        "vertices": mesh.positions.len(),
+        "normals": !mesh.normals.is_empty(),
+        "texture_coordinates": !mesh.uvs.is_empty(),
+        "attributes": attributes,
+        "bounds": bounds,
+        "area": mesh.area(),
+        "geometry_bytes": mesh.bytes(),
+    }))
+}
+
+fn picture(picture: &Picture) -> Value {
+    let image = &picture.image;
+    let count = image.channels().len();
+    let channels: Vec<Value> = image
+        .channels()
+        .iter()
+        .enumerate()
+        .map(|(c, name)| {
+            let values = || image.data().iter().skip(c).step_by(count).copied();
+            let finite = || values().filter(|v| v.is_finite());
+            let n = finite().count();
+            json!({
+                "name": name,
+                "least": finite().reduce(f32::min),
+                "mean": (n > 0).then(|| finite().map(f64::from).sum::<f64>() / n as f64),
+                "greatest": finite().reduce(f32::max),
+                "not_finite": values().count() - n,
+            })
+        })
+        .collect();
+    let mut layers: Vec<&str> = Vec::new();
+    for name in image.channels() {
+        let layer = name.rsplit_once('.').map_or("", |(layer, _)| layer);
+        if !layer.is_empty() && !layers.contains(&layer) {
+            layers.push(layer);
+        }
+    }
+    let metadata: serde_json::Map<String, Value> = picture
+        .metadata
+        .iter()
+        .map(|(name, value)| (name.clone(), value.clone().into()))
+        .collect();
+    json!({
+        "kind": "image",
+        "size": [image.width(), image.height()],
+        "encoding": match picture.encoding {
+            Encoding::Linear => "linear",
+            Encoding::Srgb => "sRGB",
+        },
+        "channels": channels,
+        "layers": layers,
+        "metadata": metadata,
+    })
+}
+
+/// An object for people: a line a value, what is nested further to the right.
+fn print(value: &Value, level: usize) {
+    let Value::Object(object) = value else {
+        return;
+    };
+    for (name, value) in object {
+        let label = format!("{}{}", "  ".repeat(level), name.replace('_', " "));
+        match value {
+            Value::Object(inner) if !inner.is_empty() => {
+                output::line(&label);
+                print(value, level + 1);
+            }
+            Value::Array(entries) if entries.iter().any(Value::is_object) => {
+                output::line(&label);
+                for entry in entries {
+                    let text = text(entry);
+                    output::line(&format!("{}{text}", "  ".repeat(level + 1)));
+                }
+            }
+            _ => {
+                let bytes = value.as_u64().filter(|_| name.ends_with("bytes"));
+                let text = bytes.map_or_else(|| text(value), human_bytes);
+                output::line(&format!("{label:28} {text}"));
+            }
+        }
+    }
+}
+
+/// A value on one line.
+fn text(value: &Value) -> String {
+    match value {
+        Value::Null => "none".to_owned(),
+        Value::Bool(yes) => if *yes { "yes" } else { "no" }.to_owned(),
+        Value::Number(number) => number.to_string(),
+        Value::String(text) => text.clone(),
+        Value::Array(values) if values.is_empty() => "none".to_owned(),
+        Value::Array(values) if values.iter().any(Value::is_array) => {
+            let corners: Vec<String> = values.iter().map(text).collect();
+            corners.join(" to ")
+        }
+        Value::Array(values) => values.iter().map(text).collect::<Vec<_>>().join(", "),
+        Value::Object(object) if object.is_empty() => "none".to_owned(),
+        Value::Object(object) => {
+            let fields = object.iter().filter(|(_, value)| !value.is_null());
+            let fields =
+                fields.map(|(name, value)| format!("{} {}", name.replace('_', " "), text(value)));
+            fields.collect::<Vec<_>>().join(", ")
+        }
+    }
+}

@@ -1,0 +1,139 @@
+//! What a scene holds, counted.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use serde::Serialize;
+
+use super::options::Options;
+use super::prepare::{self, View};
+use super::progress::Progress;
+use super::session::{Session, Task};
+use crate::color::ColorModel;
+use crate::description::{Description, Kind, NodeId, Part};
+use crate::error::{Problem, Result};
+
+/// What a scene holds.
+#[derive(Clone, Debug, Serialize)]
+pub struct SceneInfo {
+    /// Triangles and other primitives; each instance's are counted once.
+    pub primitives: u64,
+    /// Copies of shape groups.
+    pub instances: usize,
+    /// Low and high corner of the box around the scene, absent where it is empty.
+    pub bounds: Option<[[f32; 3]; 2]>,
+    /// Bytes of geometry in memory.
+    pub geometry_bytes: usize,
+    /// Bytes of trees in memory.
+    pub tree_bytes: usize,
+    /// Plugins in the file by kind and name, those included that nothing refers to.
+    pub plugins: BTreeMap<&'static str, BTreeMap<String, usize>>,
+    /// The sensors, in file order.
+    pub sensors: Vec<SensorInfo>,
+    /// Meshes and images that the scene names.
+    pub files: Vec<NamedFile>,
+    /// What the user should know.
+    #[serde(skip)]
+    pub warnings: Vec<Problem>,
+}
+
+/// A sensor's film and sampler.
+#[derive(Clone, Debug, Serialize)]
+pub struct SensorInfo {
+    /// As references name it.
+    pub id: Option<String>,
+    /// The plugin.
+    pub plugin: String,
+    /// Pixels across and down the film.
+    pub size: [u32; 2],
+    /// Samples a pixel.
+    pub spp: u32,
+}
+
+/// A file that a scene names.
+#[derive(Clone, Debug, Serialize)]
+pub struct NamedFile {
+    /// Where it was found.
+    pub path: PathBuf,
+    /// Its length.
+    pub bytes: u64,
+}
+
+impl Session {
+    /// Counts what a scene holds; it is loaded and its trees are built.
+    ///
+    /// # Errors
+    /// As [`Session::render`].
+    pub fn info(
+        &mut self,
+        description: &Description,
+        options: &Options,
+        progress: &dyn Progress,
+    ) -> Result<SceneInfo> {
+        let contents = self.contents(description, options, progress)?;
+        let sensors = description.children_of(description.root().node_id(), Kind::Sensor);
+        let sensor = |id: &NodeId| {
+            let look = Look {
+                description,
+                sensor: *id,
+            };
+            look.run_in(options.colors)
+        };
+        let bounds = contents.bounds;
+        let corners = [bounds.min, bounds.max].map(|corner| corner.to_array());
+        let mut files = description.canonical(Part::Scene).files;
+        files.sort();
+        files.dedup();
+        let file = |path: PathBuf| NamedFile {
+            bytes: std::fs::metadata(&path).map_or(0, |m| m.len()),
+            path,
+        };
+        Ok(SceneInfo {
+            primitives: contents.primitives,
+            instances: contents.instances,
+            bounds: (!bounds.is_empty()).then_some(corners),
+            geometry_bytes: contents.bytes[0],
+            tree_bytes: contents.bytes[1],
+            plugins: plugins(description),
+            sensors: sensors.iter().map(sensor).collect::<Result<_>>()?,
+            files: files.into_iter().map(file).collect(),
+            warnings: contents.warnings,
+        })
+    }
+}
+
+/// Reads a sensor.
+struct Look<'a> {
+    description: &'a Description,
+    sensor: NodeId,
+}
+
+impl Task for Look<'_> {
+    type Output = SensorInfo;
+
+    fn run<C: ColorModel>(self, _color: C) -> Result<SensorInfo> {
+        let View { film, sampler, .. } = prepare::view::<C>(self.description, self.sensor)?;
+        let properties = self.description.node(self.sensor);
+        Ok(SensorInfo {
+            id: properties.id().map(str::to_owned),
+            plugin: properties.plugin().to_owned(),
+            size: [film.width, film.height],
+            spp: sampler.sample_count(),
+        })
+    }
+}
+
+/// How often each plugin stands in the file.
+fn plugins(description: &Description) -> BTreeMap<&'static str, BTreeMap<String, usize>> {
+    let mut all = BTreeMap::new();
+    for kind in Kind::ALL.into_iter().filter(|kind| *kind != Kind::Scene) {
+        let mut counts = BTreeMap::new();
+        for node in description.nodes_of(kind) {
+            *counts.entry(node.plugin().to_owned()).or_default() += 1;
+        }
+        if !counts.is_empty() {
+            all.insert(kind.tag(), counts);
+        }
+    }
+    all
+}

@@ -1,0 +1,390 @@
+//! Renders as a whole: stopped and continued, one after another over one scene, and on bad days.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::time::Duration;
+
+use super::*;
+use crate::description;
+use crate::mesh::read;
+
+/// A small scene; `%` stands for what the test changes.
+const SCENE: &str = "<scene version='3.0.0'>
+    <integrator type='path'><integer name='max_depth' value='3'/></integrator>
+    <sensor type='perspective' id='a'>
+        <transform name='to_world'><lookat origin='0, 1, 5' target='0, 0, 0' up='0, 1, 0'/></transform>
+        <film type='hdrfilm'><integer name='width' value='70'/><integer name='height' value='40'/></film>
+        <sampler type='independent'><integer name='sample_count' value='40'/></sampler>
+    </sensor>
+    <sensor type='perspective' id='b'>
+        <transform name='to_world'><lookat origin='5, 1, 0' target='0, 0, 0' up='0, 1, 0'/></transform>
+        <film type='hdrfilm'><integer name='width' value='24'/><integer name='height' value='16'/></film>
+        <sampler type='independent'><integer name='sample_count' value='4'/></sampler>
+    </sensor>
+    <emitter type='constant'/>
+    <shape type='sphere'/>
+    <shape type='ply'><string name='filename' value='floor.ply'/></shape>
+</scene>";
+
+const FLOOR: &str = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n-9 -1 -9\n9 -1 -9\n0 -1 9\n3 0 2 1\n";
+
+/// A folder with the scene's mesh in it.
+struct Place(tempfile::TempDir);
+
+impl Place {
+    fn new() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("floor.ply"), FLOOR).unwrap();
+        Self(folder)
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn scene(&self, text: &str) -> Description {
+        let options = description::Options::default();
+        Description::parse(text, &self.path("scene.xml"), &options).unwrap()
+    }
+
+    /// With a checkpoint that is written as often as possible.
+    fn keeping(&self) -> Options {
+        let checkpoint = Checkpoint {
+            path: self.path("image.exr.checkpoint"),
+            every: Some(Duration::ZERO),
+            resume: true,
+        };
+        Options {
+            checkpoint: Some(checkpoint),
+            ..Options::default()
+        }
+    }
+}
+
+/// Counts loadings, and asks to stop after so many batches.
+#[derive(Default)]
+struct Watch {
+    loaded: AtomicUsize,
+    batches: AtomicUsize,
+    stop_after: Option<usize>,
+    rendering: AtomicBool,
+}
+
+impl Watch {
+    fn stopping_after(batches: usize) -> Self {
+        Self {
+            stop_after: Some(batches),
+            ..Self::default()
+        }
+    }
+}
+
+impl Progress for Watch {
+    fn begin(&self, phase: Phase, _total: u64) {
+        self.rendering
+            .store(phase == Phase::Render, Ordering::Relaxed);
+        if phase == Phase::Load {
+            self.loaded.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    fn advance(&self, _steps: u64, rays: u64) {
+        if self.rendering.load(Ordering::Relaxed) && rays > 0 {
+            self.batches.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    fn stop(&self) -> bool {
+        self.stop_after
+            .is_some_and(|n| self.batches.load(Ordering::Relaxed) >= n)
+    }
+}
+
+#[test]
+fn a_render_that_is_stopped_again_and_again_ends_with_the_same_bits() {
+    let place = Place::new();
+    let scene = place.scene(SCENE);
+    let whole = render(&scene, &Options::default(), &Silent).unwrap();
+    assert!(whole.report.completed.is_whole());
+    let mut runs = 0;
+    let resumed = loop {
+        // Another number of threads each time, and a process of its own as far as the session goes.
+        let options = Options {
+            threads: std::num::NonZeroUsize::new(1 + runs % 3),
+            ..place.keeping()
+        };
+        let rendered = render(&scene, &options, &Watch::stopping_after(1)).unwrap();
+        runs += 1;
+        let completed = rendered.report.completed;
+        if completed.is_whole() {
+            options.checkpoint.unwrap().remove();
+            break rendered;
+        }
+        assert!(completed.units[0] > 0 && completed.samples < 40);
+        assert!(runs < 100, "every run goes on");
+    };
+    assert!(runs > 3, "{runs}");
+    assert_eq!(resumed.image, whole.image);
+    assert_eq!(resumed.report.stats, whole.report.stats);
+    assert_eq!(fs::read_dir(place.0.path()).unwrap().count(), 1);
+}
+
+#[test]
+fn a_stopped_render_says_how_much_of_it_is_there() {
+    let place = Place::new();
+    let scene = place.scene(SCENE);
+    let tiles = 3 * 2;
+    for batches in [0, 7, 13] {
+        let options = Options {
+            threads: std::num::NonZeroUsize::new(1),
+            ..Options::default()
+        };
+        let watch = Watch::stopping_after(batches);
+        let rendered = render(&scene, &options, &watch).unwrap();
+        let Completed {
+            samples,
+            passes,
+            units,
+        } = rendered.report.completed;
+        assert!(units[0] <= batches && units[1] == 3 * tiles);
+        assert_eq!(passes, [(units[0] / tiles) as u32, 3]);
+        assert_eq!(samples, 16 * passes[0]);
+        let entry = rendered
+            .metadata
+            .entries
+            .iter()
+            .find(|(name, _)| name == "samples_complete");
+        assert_eq!(entry.unwrap().1, samples.into());
+        if batches == 0 {
+            assert!(rendered.image.data().iter().all(|v| *v == 0.0));
+        }
+    }
+}
+
+/// A checkpoint of a render that was stopped.
+fn stopped(place: &Place) -> (Description, Options) {
+    let (scene, options) = (place.scene(SCENE), place.keeping());
+    let watch = Watch::stopping_after(4);
+    let rendered = render(&scene, &options, &watch).unwrap();
+    assert!(!rendered.report.completed.is_whole());
+    (scene, options)
+}
+
+#[test]
+fn a_checkpoint_of_another_render_is_refused_and_says_what_is_another() {
+    let place = Place::new();
+    let (scene, options) = stopped(&place);
+    let refusal = |scene: &Description, options: &Options| {
+        render(scene, options, &Silent).unwrap_err().to_string()
+    };
+    let seed = Options {
+        seed: 1,
+        ..options.clone()
+    };
+    assert!(refusal(&scene, &seed).contains("a setting"));
+    let bands = Options {
+        colors: Colors::Bands(3),
+        ..options.clone()
+    };
+    assert!(refusal(&scene, &bands).contains("a setting"));
+    let other = place.scene(&SCENE.replace(
+        "type='constant'/",
+        "type='constant'><float name='radiance' value='2'/></emitter",
+    ));
+    assert!(refusal(&other, &options).contains("the scene ("));
+    let nearer = place.scene(&SCENE.replace("0, 1, 5", "0, 1, 4"));
+    assert!(refusal(&nearer, &options).contains("the view ("));
+    let mut more = place.scene(SCENE);
+    let overrides = Overrides {
+        spp: Some(41),
+        ..Overrides::default()
+    };
+    overrides.apply(&mut more);
+    assert!(refusal(&more, &options).contains("the view ("));
+    fs::write(
+        place.path("floor.ply"),
+        FLOOR.replace("-9 -1 -9", "-8 -1 -9"),
+    )
+    .unwrap();
+    assert!(refusal(&scene, &options).contains("a mesh or an image"));
+    fs::write(place.path("floor.ply"), FLOOR).unwrap();
+    let again = place.scene(&format!("<!-- the same -->\n{SCENE}"));
+    assert!(render(&again, &options, &Silent).is_ok());
+}
+
+#[test]
+fn no_damage_to_a_checkpoint_is_believed() {
+    let place = Place::new();
+    let (scene, options) = stopped(&place);
+    let path = place.path("image.exr.checkpoint");
+    let good = fs::read(&path).unwrap();
+    let mut session = Session::default();
+    let mut refused = |bytes: &[u8], what: &str| {
+        fs::write(&path, bytes).unwrap();
+        let error = session.render(&scene, &options, &Watch::stopping_after(0));
+        let message = error.expect_err(what).to_string();
+        assert!(message.contains("checkpoint"), "{what}: {message}");
+    };
+    let header = good.iter().rposition(|b| *b == b'}').unwrap();
+    let cuts = (0..40)
+        .chain((40..header).step_by(97))
+        .chain([header, good.len() - 1]);
+    for length in cuts {
+        refused(&good[..length], &format!("cut to {length}"));
+    }
+    for at in (0..600.min(good.len())).chain((600..good.len()).step_by(1999)) {
+        let mut bytes = good.clone();
+        bytes[at] ^= 0x40;
+        refused(&bytes, &format!("byte {at} changed"));
+    }
+    let mut long = good.clone();
+    long.extend([0; 64]);
+    refused(&long, "more at the end");
+    let mut huge = good.clone();
+    huge[16..20].fill(0xff);
+    refused(&huge, "a header of 4 GB");
+    refused(b"", "nothing");
+}
+
+#[test]
+fn a_checkpoint_that_cannot_be_written_is_a_warning() {
+    let place = Place::new();
+    let mut options = place.keeping();
+    let missing = place.path("no/such/folder");
+    options.checkpoint.as_mut().unwrap().path = missing;
+    let rendered = render(&place.scene(SCENE), &options, &Silent).unwrap();
+    assert!(rendered.report.completed.is_whole());
+    let said = rendered.warnings[0].to_string();
+    assert!(said.contains("cannot write the checkpoint"), "{said}");
+}
+
+#[test]
+fn views_and_frames_of_one_scene_share_it_and_another_scene_takes_its_place() {
+    let place = Place::new();
+    let (mut session, watch) = (Session::default(), Watch::default());
+    let mut loadings = |scene: &Description, sensor: usize| {
+        let options = Options {
+            sensor,
+            ..Options::default()
+        };
+        let shared = session.render(scene, &options, &watch).unwrap();
+        let alone = render(scene, &options, &Silent).unwrap();
+        assert_eq!(shared.image, alone.image);
+        watch.loaded.load(Ordering::Relaxed)
+    };
+    assert_eq!(loadings(&place.scene(SCENE), 0), 1);
+    assert_eq!(loadings(&place.scene(SCENE), 1), 1);
+    let nearer = SCENE.replace("0, 1, 5", "0, 1, 4");
+    assert_eq!(loadings(&place.scene(&nearer), 0), 1);
+    let larger = SCENE.replace(
+        "'sphere'/",
+        "'sphere'><float name='radius' value='1.5'/></shape",
+    );
+    assert_eq!(loadings(&place.scene(&larger), 0), 2);
+    fs::write(
+        place.path("floor.ply"),
+        FLOOR.replace("-9 -1 -9", "-10.5 -1 -9"),
+    )
+    .unwrap();
+    assert_eq!(loadings(&place.scene(&larger), 0), 3);
+}
+
+#[test]
+fn a_shared_scene_hides_no_mistake_of_a_view() {
+    let place = Place::new();
+    let mut session = Session::default();
+    let options = Options::default();
+    session
+        .render(&place.scene(SCENE), &options, &Silent)
+        .unwrap();
+    let odd = SCENE.replace(
+        "<integer name='max_depth' value='3'/>",
+        "<integer name='max_dept' value='3'/>",
+    );
+    for _ in 0..2 {
+        let error = session
+            .render(&place.scene(&odd), &options, &Silent)
+            .unwrap_err();
+        assert!(error.to_string().contains("max_dept"), "{error}");
+    }
+}
+
+#[test]
+fn what_does_not_fit_into_memory_is_refused_before_anything_is_loaded() {
+    let place = Place::new();
+    let watch = Watch::default();
+    for (size, limit, part) in [((4000, 4000), 600_000_000, "--crop"), ((8, 8), 5_000, "")] {
+        let mut scene = place.scene(SCENE);
+        let overrides = Overrides {
+            size: Some(size),
+            ..Overrides::default()
+        };
+        overrides.apply(&mut scene);
+        let options = Options {
+            memory_limit: Some(limit),
+            ..Options::default()
+        };
+        let error = render(&scene, &options, &watch).unwrap_err().to_string();
+        assert!(error.contains("more than the limit"), "{error}");
+        assert!(error.contains(part), "{error}");
+        assert_eq!(watch.loaded.load(Ordering::Relaxed), 0);
+    }
+}
+
+#[test]
+fn samples_that_are_not_finite_are_dropped_counted_and_told() {
+    let place = Place::new();
+    // Of two lights one is chosen, which doubles the other's light: too much for a float.
+    let bright = "type='point'/><emitter type='constant'><rgb name='radiance' value='3e38, 3e38, 3e38'/></emitter";
+    let scene = place.scene(&SCENE.replace("type='constant'/", bright));
+    let rendered = render(&scene, &Options::default(), &Silent).unwrap();
+    assert!(rendered.report.dropped_samples > 0);
+    assert!(rendered.report.dropped_pixel.is_some());
+    let said = rendered.warnings[0].to_string();
+    assert!(said.contains("were not finite and were dropped"), "{said}");
+    let weights = rendered.image.data().iter().filter(|v| v.is_nan());
+    assert_eq!(weights.count(), 0);
+}
+
+#[test]
+fn a_film_has_the_channels_of_its_format() {
+    let place = Place::new();
+    let image = |format: &str| {
+        let film = format!("type='hdrfilm'><string name='pixel_format' value='{format}'/>");
+        // An environment would be met wherever nothing else is.
+        let text = SCENE.replace("type='constant'", "type='point'");
+        let scene = place.scene(&text.replace("type='hdrfilm'>", &film));
+        render(&scene, &Options::default(), &Silent).unwrap().image
+    };
+    let (rgb, rgba, grey) = (image("rgb"), image("rgba"), image("luminance"));
+    assert_eq!(rgb.channels(), ["R", "G", "B"]);
+    assert_eq!(rgba.channels(), ["R", "G", "B", "A"]);
+    assert_eq!(grey.channels(), ["Y"]);
+    let (mut covered, mut open) = (false, false);
+    for (x, y) in (0..40).flat_map(|y| (0..70).map(move |x| (x, y))) {
+        let color = [0, 1, 2].map(|c| rgb.get(x, y, c));
+        assert_eq!(&rgba.pixel(x, y)[..3], color);
+        assert_eq!(grey.get(x, y, 0), crate::color::luminance(color));
+        let alpha = rgba.get(x, y, 3);
+        assert!((0.0..=1.000_001).contains(&alpha));
+        covered |= alpha > 0.999;
+        open |= alpha < 0.001;
+    }
+    assert!(covered && open);
+}
+
+#[test]
+fn a_bare_mesh_is_in_the_middle_of_its_turntable() {
+    let place = Place::new();
+    let path = place.path("floor.ply");
+    let options = description::Options::default();
+    let description = describe_mesh(&path, UpAxis::Y, &options).unwrap();
+    let bounds = Session::default()
+        .bounds(&description, &Options::default(), &Silent)
+        .unwrap();
+    let mesh = read(Path::new(&path), &Default::default()).unwrap().mesh;
+    let (low, high) = mesh.bounds().unwrap();
+    let off = 0.5 * (bounds.min + bounds.max) - 0.5 * (low + high);
+    assert!(off.x.abs() < 1e-3 && off.z.abs() < 1e-3, "{off}");
+}

@@ -1,0 +1,306 @@
+//! The command line as its users meet it: what it prints, what it leaves and how it ends. The texts of
+//! `--help` stand in `tests/golden/help`; `ETENDUE_BLESS=1` writes them anew.
+
+use std::fs;
+use std::path::PathBuf;
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+use crate::support::at;
+
+const SCENE: &str = r#"<scene version="3.0.0">
+    <default name="x" value="0"/>
+    <default name="frame" value="0"/>
+    <sensor type="perspective" id="front">
+        <transform name="to_world"><lookat origin="0, 1, 6" target="0, 0, 0" up="0, 1, 0"/></transform>
+        <film type="hdrfilm"><integer name="width" value="24"/><integer name="height" value="16"/></film>
+        <sampler type="independent"><integer name="sample_count" value="2"/></sampler>
+    </sensor>
+    <sensor type="perspective">
+        <transform name="to_world"><lookat origin="6, 1, 0" target="0, 0, 0" up="0, 1, 0"/></transform>
+        <film type="hdrfilm"><integer name="width" value="24"/><integer name="height" value="16"/></film>
+        <sampler type="independent"><integer name="sample_count" value="2"/></sampler>
+    </sensor>
+    <emitter type="constant"/>
+    <shape type="cube"><transform name="to_world"><translate x="$x" y="$frame"/></transform></shape>
+</scene>"#;
+
+const MESH: &str = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+
+/// A folder with a scene, a mesh and a broken scene in it.
+struct Place(tempfile::TempDir);
+
+impl Place {
+    fn new() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let broken = SCENE
+            .replace("\"cube\"", "\"cueb\"")
+            .replace("constant", "konstant");
+        for (name, text) in [
+            ("scene.xml", SCENE),
+            ("broken.xml", &broken),
+            ("mesh.ply", MESH),
+        ] {
+            fs::write(folder.path().join(name), text).unwrap();
+        }
+        Self(folder)
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    /// Runs `etendue` with the words of `arguments`.
+    fn run(&self, arguments: &str) -> Run {
+        let output = Command::new(env!("CARGO_BIN_EXE_etendue"))
+            .current_dir(self.0.path())
+            .args(arguments.split(' '))
+            .output()
+            .unwrap();
+        Run(output)
+    }
+
+    fn bytes(&self, name: &str) -> Vec<u8> {
+        fs::read(self.path(name)).unwrap_or_else(|e| panic!("{name}: {e}"))
+    }
+}
+
+struct Run(Output);
+
+impl Run {
+    fn status(&self) -> i32 {
+        self.0.status.code().unwrap()
+    }
+
+    fn stdout(&self) -> String {
+        String::from_utf8(self.0.stdout.clone()).unwrap()
+    }
+
+    fn stderr(&self) -> String {
+        String::from_utf8(self.0.stderr.clone()).unwrap()
+    }
+
+    /// The objects on standard output, one a line.
+    #[track_caller]
+    fn objects(&self) -> Vec<Value> {
+        let lines = self.stdout();
+        lines
+            .lines()
+            .map(|l| serde_json::from_str(l).unwrap())
+            .collect()
+    }
+
+    #[track_caller]
+    fn ends_with(&self, status: i32) -> &Self {
+        assert_eq!(self.status(), status, "{}", self.stderr());
+        self
+    }
+}
+
+#[test]
+fn help_reads_as_it_was_blessed() {
+    for (name, arguments) in [
+        ("etendue", &["--help"][..]),
+        ("render", &["render", "--help"]),
+        ("check", &["check", "--help"]),
+        ("info", &["info", "--help"]),
+    ] {
+        let output = Command::new(env!("CARGO_BIN_EXE_etendue"))
+            .args(arguments)
+            .env("COLUMNS", "100")
+            .output()
+            .unwrap();
+        let text = String::from_utf8(output.stdout).unwrap();
+        let golden = at(&format!("tests/golden/help/{name}.txt"));
+        if std::env::var_os("ETENDUE_BLESS").is_some() {
+            fs::create_dir_all(golden.parent().unwrap()).unwrap();
+            fs::write(&golden, &text).unwrap();
+        }
+        let expected = fs::read_to_string(&golden).unwrap_or_default();
+        assert_eq!(text, expected, "{name}: ETENDUE_BLESS=1 blesses it");
+        assert!(text.contains("Exit status: 0 done;"), "{name}");
+    }
+}
+
+#[test]
+fn frames_define_their_number_and_name_their_files() {
+    let place = Place::new();
+    let run = place.run("render scene.xml -o f{frame:02}.exr --frames 0:3:2 -D x={frame} --json");
+    let told = run.ends_with(0).objects();
+    assert_eq!(told.len(), 2);
+    assert_eq!(
+        (&told[0]["frame"], &told[1]["frame"]),
+        (&0.into(), &2.into())
+    );
+    place
+        .run("render scene.xml -o alone.exr -D x=2 -D frame=2 -q")
+        .ends_with(0);
+    let pixels = |name: &str| {
+        let path = place.path(name);
+        etendue::image::read(&path, &Default::default())
+            .unwrap()
+            .image
+    };
+    assert_eq!(pixels("f02.exr"), pixels("alone.exr"));
+    assert_ne!(pixels("f00.exr"), pixels("f02.exr"));
+}
+
+#[test]
+fn a_turntable_loads_its_scene_once_and_comes_around() {
+    let place = Place::new();
+    let run =
+        place.run("render mesh.ply -o t{frame}.exr --turntable 3 --size 30x20 --spp 1 --json");
+    let told = run.ends_with(0).objects();
+    assert_eq!(told.len(), 3);
+    for frame in &told[1..] {
+        assert_eq!(frame["seconds"]["load"], 0.0);
+        assert_eq!(frame["seconds"]["build"], 0.0);
+    }
+    let pixels = |name: &str| {
+        let path = place.path(name);
+        etendue::image::read(&path, &Default::default())
+            .unwrap()
+            .image
+    };
+    assert_ne!(pixels("t0.exr"), pixels("t1.exr"));
+    place
+        .run("render mesh.ply -o u{frame}.exr --turntable 3 --frames 1:5:3 --size 30x20 --spp 1 -q")
+        .ends_with(0);
+    assert_eq!(pixels("u1.exr"), pixels("t1.exr"));
+    assert_eq!(pixels("u4.exr"), pixels("t1.exr"));
+}
+
+#[test]
+fn sensors_are_chosen_by_number_by_id_and_all_together() {
+    let place = Place::new();
+    place
+        .run("render scene.xml -o s-{sensor}.png --sensor all -q")
+        .ends_with(0);
+    let (front, side) = (place.bytes("s-front.png"), place.bytes("s-1.png"));
+    assert_ne!(front, side);
+    for (sensor, expected) in [("0", &front), ("front", &front), ("1", &side)] {
+        place
+            .run(&format!("render scene.xml -o one.png --sensor {sensor} -q"))
+            .ends_with(0);
+        assert_eq!(&place.bytes("one.png"), expected, "{sensor}");
+    }
+    let run = place.run("render scene.xml -o one.png --sensor frunt");
+    let said = run.ends_with(1).stderr();
+    assert!(said.contains("there are front, 1") && said.contains("did you mean \"front\"?"));
+    let run = place.run("render scene.xml -o one.png --sensor 2");
+    assert!(run.ends_with(1).stderr().contains("no sensor \"2\""));
+    let run = place.run("render scene.xml -o one.png --sensor all");
+    let said = run.ends_with(1).stderr();
+    assert!(said.contains("scene.xml and scene.xml, sensor 1 would both be written to one.png"));
+}
+
+#[test]
+fn a_failing_image_does_not_keep_the_others_from_being_made() {
+    let place = Place::new();
+    let run = place
+        .run("render scene.xml broken.xml missing.xml mesh.ply -o {name}.png --spp 1 --size 8x8");
+    let table = run.ends_with(3).stdout();
+    assert!(table.contains("4 images: 2 rendered, 2 failed"), "{table}");
+    assert!(
+        table.contains("failed      broken.png  broken.xml:"),
+        "{table}"
+    );
+    assert!(place.path("scene.png").exists() && place.path("mesh.png").exists());
+    let told = place
+        .run("render scene.xml broken.xml -o {name}.png --spp 1 --size 8x8 --json")
+        .ends_with(1)
+        .objects();
+    assert_eq!(told[0]["status"], "rendered");
+    assert_eq!(told[1]["status"], "failed");
+    assert!(told[1]["problems"][0]["location"]["line"].as_u64() > Some(1));
+}
+
+#[test]
+fn what_is_there_is_skipped_if_that_is_asked_for() {
+    let place = Place::new();
+    fs::write(place.path("f1.png"), "kept").unwrap();
+    let run = place.run("render scene.xml -o f{frame}.png --frames 0:2 --skip-existing");
+    let table = run.ends_with(0).stdout();
+    assert!(table.contains("2 images: 1 rendered, 1 skipped"), "{table}");
+    assert_eq!(place.bytes("f1.png"), b"kept");
+    fs::write(place.path("f1.png.checkpoint"), "").unwrap();
+    place
+        .run("render scene.xml -o f1.png --skip-existing -q")
+        .ends_with(0);
+    assert_ne!(place.bytes("f1.png"), b"kept");
+}
+
+#[test]
+fn what_would_stop_an_image_from_being_written_is_said_before_rendering() {
+    let place = Place::new();
+    for (output, said) in [
+        ("no/such/{name}.png", "folder no/such does not exist"),
+        ("{nmae}.png", "unknown {nmae}"),
+        ("image.tiff", "unknown extension"),
+    ] {
+        let run = place.run(&format!(
+            "render scene.xml mesh.ply -o {output} --spp 1000000"
+        ));
+        let stderr = run.ends_with(1).stderr();
+        assert!(
+            stderr.contains(said) || stderr.contains("would both"),
+            "{stderr}"
+        );
+    }
+    let run = place.run("render mesh.ply -o a.png --memory-limit 2M --size 2000x2000");
+    assert!(
+        run.ends_with(1)
+            .stderr()
+            .contains("more than the limit of 2.0 MB")
+    );
+    assert_eq!(fs::read_dir(place.0.path()).unwrap().count(), 3);
+}
+
+#[test]
+fn check_finds_everything_and_renders_nothing() {
+    let place = Place::new();
+    let run = place.run("check scene.xml broken.xml");
+    assert_eq!(run.ends_with(1).stdout(), "scene.xml: in order\n");
+    let said = run.stderr();
+    assert!(said.contains("did you mean \"cube\"?"), "{said}");
+    let told = place
+        .run("check scene.xml broken.xml mesh.ply --json")
+        .ends_with(1)
+        .objects();
+    let ok: Vec<_> = told.iter().map(|o| o["ok"].as_bool()).collect();
+    assert_eq!(ok, [Some(true), Some(false), Some(true)]);
+    let quiet = place.run("check scene.xml mesh.ply -q");
+    assert_eq!((quiet.status(), quiet.stdout().as_str()), (0, ""));
+}
+
+#[test]
+fn info_counts_what_scenes_meshes_and_images_hold() {
+    let place = Place::new();
+    place
+        .run("render scene.xml -o image.exr --seed 5 -q")
+        .ends_with(0);
+    let told = place
+        .run("info scene.xml mesh.ply image.exr --json")
+        .ends_with(0)
+        .objects();
+    let [scene, mesh, image] = &told[..] else {
+        panic!("{told:?}");
+    };
+    assert_eq!(scene["primitives"], 12);
+    assert_eq!(scene["plugins"]["shape"]["cube"], 1);
+    assert_eq!(scene["sensors"][0]["id"], "front");
+    assert_eq!(scene["sensors"][1]["size"], serde_json::json!([24, 16]));
+    assert_eq!(mesh["triangles"], 1);
+    assert_eq!(mesh["vertices"], 3);
+    assert_eq!(mesh["area"], 0.5);
+    assert_eq!(image["size"], serde_json::json!([24, 16]));
+    assert_eq!(image["metadata"]["seed"], "5");
+    assert_eq!(image["channels"].as_array().unwrap().len(), 3);
+    let text = place.run("info scene.xml mesh.ply image.exr missing.png");
+    let lines = text.ends_with(3).stdout();
+    assert!(
+        lines.contains("mesh.ply\n") && lines.contains("  triangles "),
+        "{lines}"
+    );
+}
