@@ -173,7 +173,7 @@ impl Surface for Cylinder {
         let position = self.to_world.transform_point3(local).as_vec3();
         let normal = self.normal(around);
         let pdf = self.density(from, position, around, normal);
-        (pdf > 0.0).then(|| SurfaceSample {
+        (pdf > 0.0).then_some(SurfaceSample {
             position,
             normal,
             uv: u,
