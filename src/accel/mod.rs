@@ -61,6 +61,8 @@ pub struct Instance {
 pub struct Tracer {
     shapes: Vec<Arc<Geometry>>,
     instances: Vec<Instance>,
+    /// Each instance's box in the world.
+    instance_bounds: Vec<Bounds>,
     groups: Vec<Group>,
     method: Method,
 }
@@ -94,20 +96,24 @@ impl Tracer {
         let mut groups: Vec<Group> = (1..count)
             .map(|g| Group::new(members(g).unzip(), method))
             .collect();
-        let placed = instances.iter().enumerate().filter_map(|(i, instance)| {
-            let bounds = groups[instance.group as usize - 1].bounds();
-            (!bounds.is_empty()).then(|| {
-                (
-                    Item::instance(i as u32),
-                    bounds.transformed(&instance.to_world),
-                )
-            })
-        });
+        let instance_bounds: Vec<Bounds> = (instances.iter())
+            .map(
+                |instance| match groups[instance.group as usize - 1].bounds() {
+                    bounds if bounds.is_empty() => bounds,
+                    bounds => bounds.transformed(&instance.to_world),
+                },
+            )
+            .collect();
+        let placed = (0..)
+            .map(Item::instance)
+            .zip(instance_bounds.iter().copied());
+        let placed = placed.filter(|(_, bounds)| !bounds.is_empty());
         let world = Group::new(members(0).chain(placed).unzip(), method);
         groups.insert(0, world);
         Self {
             shapes,
             instances,
+            instance_bounds,
             groups,
             method,
         }
@@ -259,10 +265,8 @@ impl<'t> Walk<'t> {
     ) -> bool {
         if let Some(inner) = item.as_instance() {
             let Instance { to_world, group } = &self.tracer.instances[inner as usize];
-            let bounds = self.tracer.groups[*group as usize]
-                .bounds()
-                .transformed(to_world);
-            return boxes.entry(&bounds, best.t).is_some_and(|entry| {
+            let bounds = &self.tracer.instance_bounds[inner as usize];
+            return boxes.entry(bounds, best.t).is_some_and(|entry| {
                 self.group::<ANY>(*group, &to_local(to_world, ray), inner, entry, best)
             });
         }

@@ -1,9 +1,12 @@
 //! The tree against brute force, to the bit, and closed meshes without a hole.
 
+use std::path::Path;
+
 use super::*;
+use crate::description::{Description, Kind, Options, Properties};
 use crate::math::{random, warp};
 use crate::mesh::{self, Mesh};
-use crate::shape::TriangleMesh;
+use crate::shape::{self, TriangleMesh};
 use glam::{DMat4, DVec3, Vec2, Vec3};
 
 fn uniform(seed: u64, i: u32) -> f32 {
@@ -79,6 +82,27 @@ fn the_tree_and_brute_force_find_the_same_hits_to_the_bit() {
     ];
     let tracers = both(&shapes, &[0, 0, 1], &instances);
     assert!(agree(&tracers, &rays(20_000, &targets)) > 10_000);
+}
+
+#[test]
+fn surfaces_with_equations_are_found_alike_in_the_world_and_in_instances() {
+    let text = r#"<scene version="3.0.0"><shape type="sphere"><float name="radius" value="0.7"/></shape>
+        <shape type="disk"/><shape type="cylinder"><float name="radius" value="0.4"/></shape></scene>"#;
+    let scene = Description::parse(text, Path::new("test.xml"), &Options::default()).unwrap();
+    let build = |p: &Properties<'_>| Arc::new(shape::build(p).unwrap().geometry);
+    let shapes: Vec<_> = scene
+        .root()
+        .children(Kind::Shape)
+        .iter()
+        .map(build)
+        .collect();
+    let twice: Vec<_> = shapes.iter().chain(&shapes).cloned().collect();
+    let transform = DMat4::from_rotation_x(1.0) * DMat4::from_scale(DVec3::new(1.0, -0.5, 2.0));
+    let to_world = Transform::new(&transform).unwrap();
+    let instances = [Instance { to_world, group: 1 }];
+    let tracers = both(&twice, &[0, 0, 0, 1, 1, 1], &instances);
+    let rays = rays(20_000, &[Vec3::ZERO, Vec3::X, Vec3::new(0.0, 0.4, 0.5)]);
+    assert!(agree(&tracers, &rays) > 10_000);
 }
 
 #[test]

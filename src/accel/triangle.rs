@@ -1,23 +1,21 @@
 //! Rays against triangles, watertight: the shear of Woop, Benthin and Wald (*Watertight ray/triangle
 //! intersection*, 2013). Edge functions are differences of two products that are rounded one by one,
 //! never fused: rounding is monotonic, so their sign is right wherever it is not zero, and zero counts
-//! as inside.
-//!
-//! A distance that could be negative but for rounding is no hit (Pharr, Jakob and Humphreys, *PBRT* 4th
-//! ed., 6.8.7): a ray that starts on a triangle, or on a neighbour in the same plane, does not meet it.
+//! as inside. The distance is computed in double precision: seen from a point that leaves a large triangle
+//! at a flat angle, the sum of the corners' distances cancels, and the triangle would shadow itself.
 
 use glam::Vec3;
 
 use crate::interaction::Ray;
-use crate::math::offset::gamma;
 
 /// A ray prepared for triangles: the axis along which it mostly goes becomes z, and a shear makes it
 /// that axis.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Shear {
     origin: Vec3,
+    direction: Vec3,
     axes: [usize; 3],
-    shear: [f32; 3],
+    shear: [f32; 2],
 }
 
 impl Shear {
@@ -39,8 +37,9 @@ impl Shear {
         };
         Self {
             origin: ray.origin,
+            direction: ray.direction,
             axes: [x, y, z],
-            shear: [d[x] / d[z], d[y] / d[z], 1.0 / d[z]],
+            shear: [d[x] / d[z], d[y] / d[z]],
         }
     }
 
@@ -50,11 +49,7 @@ impl Shear {
         let [x, y, z] = self.axes;
         let [a, b, c] = corners.map(|p| {
             let p = (p - self.origin).to_array();
-            (
-                p[x] - self.shear[0] * p[z],
-                p[y] - self.shear[1] * p[z],
-                p[z],
-            )
+            (p[x] - self.shear[0] * p[z], p[y] - self.shear[1] * p[z])
         });
         let u = c.0 * b.1 - c.1 * b.0;
         let v = a.0 * c.1 - a.1 * c.0;
@@ -67,29 +62,45 @@ impl Shear {
             return None;
         }
         let inverse = 1.0 / determinant;
-        let t = (u * a.2 + v * b.2 + w * c.2) * self.shear[2] * inverse;
-        if !(t > 0.0 && t <= limit) {
-            return None;
-        }
-        let largest = |a: f32, b: f32, c: f32| a.abs().max(b.abs()).max(c.abs());
-        let (x, y) = (largest(a.0, b.0, c.0), largest(a.1, b.1, c.1));
-        let (z, edge) = (largest(a.2, b.2, c.2), largest(u, v, w));
-        let error = t_error([x, y, z * self.shear[2].abs()], edge) * inverse.abs();
-        (t > error).then_some((t, v * inverse, w * inverse))
+        let t = self.distance(corners);
+        (t > 0.0 && t <= limit).then_some((t, v * inverse, w * inverse))
     }
-}
 
-/// A bound on the rounding error of t times the determinant, for coordinates and edge functions up to these
-/// magnitudes.
-fn t_error([x, y, z]: [f32; 3], edge: f32) -> f32 {
-    let (dx, dy, dz) = (gamma(5) * (x + z), gamma(5) * (y + z), gamma(3) * z);
-    let edge_error = 2.0 * (gamma(2) * x * y + dy * x + dx * y);
-    3.0 * (gamma(3) * edge * z + edge_error * z + dz * edge)
+    /// Where the ray meets the triangle's plane.
+    fn distance(&self, corners: [Vec3; 3]) -> f32 {
+        let origin = self.origin.as_dvec3();
+        let [a, b, c] = corners.map(|p| p.as_dvec3() - origin);
+        let normal = (b - a).cross(c - a);
+        (normal.dot(a) / normal.dot(self.direction.as_dvec3())) as f32
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_ray_that_leaves_a_huge_triangle_does_not_meet_it_again() {
+        let corners = [
+            Vec3::new(-1000.0, -1000.0, 0.0),
+            Vec3::new(1000.0, -1000.0, 0.0),
+            Vec3::new(1000.0, 1000.0, 0.0),
+        ];
+        for i in 0..1000 {
+            let (x, y) = (0.01 * i as f32, 0.007 * i as f32 - 8.0);
+            let mut ray = Ray {
+                origin: Vec3::new(x, y, 1e-4),
+                direction: Vec3::new(-x, -y, 1.0).normalize(),
+                t_max: f32::INFINITY,
+                time: 0.0,
+            };
+            let meets = |ray: &Ray| Shear::new(ray).intersect(corners, f32::INFINITY);
+            assert_eq!(meets(&ray), None);
+            ray.direction = -ray.direction;
+            let (t, ..) = meets(&ray).unwrap();
+            assert!((ray.at(t).z).abs() < 1e-9, "{t}");
+        }
+    }
 
     #[test]
     fn a_ray_that_starts_on_a_floor_at_height_zero_does_not_meet_it() {

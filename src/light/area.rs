@@ -52,15 +52,21 @@ impl<C: ColorModel> Emitter<C> for Area<C> {
             position,
             normal,
             uv,
+            primitive,
+            barycentric,
             pdf,
         } = self.shape.sample(from, u)?;
         let direction = (position - from).normalize();
         if direction.dot(normal) >= 0.0 {
             return None;
         }
-        let radiance = self
-            .radiance
-            .eval(&texture_point(position, normal, uv), wavelengths);
+        let point = Interaction {
+            primitive,
+            barycentric,
+            mesh: self.shape.mesh(),
+            ..texture_point(position, normal, uv)
+        };
+        let radiance = self.radiance.eval(&point, wavelengths);
         Some(LightSample {
             direction,
             target: Some(position),

@@ -1,12 +1,13 @@
-//! A bare mesh as a scene: framed by an automatic camera, on a ground, under a soft sky and a key light.
+//! A bare mesh as a scene: framed by its own camera (glTF) or an automatic one, on a ground, under a soft sky
+//! and a key light, in the colours of its vertices or faces where the file has any.
 
 use std::path::Path;
 
-use glam::Vec3;
+use glam::{DMat4, DVec3, Vec3};
 
 use crate::description::{Description, Options};
 use crate::error::{Error, Result};
-use crate::mesh::{ReadOptions, read};
+use crate::mesh::{GltfCamera, Mesh, Projection, ReadOptions, read, read_gltf};
 
 /// Which way is up in a mesh file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -25,8 +26,18 @@ pub fn is_mesh(path: &Path) -> bool {
 
 /// The shape plugin that reads the file.
 fn plugin(path: &Path) -> Option<&'static str> {
+    const PLUGINS: [(&str, &str); 6] = [
+        ("ply", "ply"),
+        ("obj", "obj"),
+        ("stl", "stl"),
+        ("serialized", "serialized"),
+        ("gltf", "gltf"),
+        ("glb", "gltf"),
+    ];
     let extension = path.extension()?.to_str()?.to_lowercase();
-    ["ply", "obj"].into_iter().find(|name| *name == extension)
+    PLUGINS
+        .iter()
+        .find_map(|(e, plugin)| (*e == extension).then_some(*plugin))
 }
 
 /// The camera's vertical field of view in degrees.
@@ -41,7 +52,7 @@ pub fn describe_mesh(path: &Path, up: UpAxis, options: &Options) -> Result<Descr
         )));
     };
     let loaded = read(path, &ReadOptions::default())?;
-    let Some((min, max)) = loaded.mesh.bounds() else {
+    let Some(bounds) = loaded.mesh.bounds() else {
         return Err(Error::input(format!(
             "{} holds no triangle",
             path.display()
@@ -51,11 +62,77 @@ pub fn describe_mesh(path: &Path, up: UpAxis, options: &Options) -> Result<Descr
         UpAxis::Y => Vec3::Y,
         UpAxis::Z => Vec3::Z,
     };
-    let text = scene(plugin, path, (min, max), up);
+    let camera = match plugin {
+        "gltf" => read_gltf(path, &ReadOptions::default())?.camera,
+        _ => None,
+    };
+    let text = scene(&Subject {
+        plugin,
+        path,
+        bounds,
+        up,
+        camera: camera.and_then(|camera| own_camera(&camera)),
+        mesh: &loaded.mesh,
+    });
     Description::parse(&text, path, options)
 }
 
-fn scene(plugin: &str, path: &Path, (min, max): (Vec3, Vec3), up: Vec3) -> String {
+/// What the scene shows.
+struct Subject<'a> {
+    plugin: &'static str,
+    path: &'a Path,
+    bounds: (Vec3, Vec3),
+    up: Vec3,
+    camera: Option<OwnCamera>,
+    mesh: &'a Mesh,
+}
+
+/// A camera that comes with the file.
+struct OwnCamera {
+    /// From Mitsuba's camera space.
+    to_world: DMat4,
+    /// In degrees.
+    fov_y: f64,
+}
+
+/// A perspective camera as a scene file says it; `None` for others.
+fn own_camera(camera: &GltfCamera) -> Option<OwnCamera> {
+    // Mitsuba's camera looks along +z with +x to the left: half a turn around y.
+    let to_world = camera.to_world * DMat4::from_scale(DVec3::new(-1.0, 1.0, -1.0));
+    match camera.projection {
+        Projection::Perspective { fov_y, .. } if fov_y > 0.0 && fov_y < std::f64::consts::PI => {
+            Some(OwnCamera {
+                to_world,
+                fov_y: fov_y.to_degrees(),
+            })
+        }
+        _ => None,
+    }
+}
+
+/// The mesh's reflectance: its own colours, or that of clay.
+fn reflectance(mesh: &Mesh) -> String {
+    let own = mesh
+        .attributes
+        .iter()
+        .find(|a| a.channels >= 3 && ["vertex_color", "face_color"].contains(&a.name.as_str()));
+    match own {
+        Some(attribute) => format!(
+            r#"<texture name="reflectance" type="mesh_attribute"><string name="name" value="{}"/></texture>"#,
+            attribute.name
+        ),
+        None => r#"<rgb name="reflectance" value="0.65, 0.6, 0.52"/>"#.to_owned(),
+    }
+}
+
+fn scene(subject: &Subject<'_>) -> String {
+    let Subject {
+        plugin,
+        path,
+        bounds: (min, max),
+        up,
+        ..
+    } = *subject;
     let center = 0.5 * (min + max);
     let radius = (0.5 * (max - min).length()).max(f32::MIN_POSITIVE);
     // From the front, a little to the right and above: right-handed with `up`.
@@ -77,15 +154,35 @@ fn scene(plugin: &str, path: &Path, (min, max): (Vec3, Vec3), up: Vec3) -> Strin
         .replace('"', "&quot;")
         .replace('<', "&lt;")
         .replace('$', "&#36;");
+    let (fov, fov_axis, to_world) = match &subject.camera {
+        Some(OwnCamera { to_world, fov_y }) => {
+            let rows = to_world.transpose().to_cols_array().map(|v| v.to_string());
+            (
+                *fov_y,
+                "y",
+                format!(r#"<matrix value="{}"/>"#, rows.join(" ")),
+            )
+        }
+        None => (
+            f64::from(FOV),
+            "smaller",
+            format!(
+                r#"<lookat origin="{}" target="{}" up="{}"/>"#,
+                point(eye),
+                point(center),
+                point(up)
+            ),
+        ),
+    };
     format!(
         r#"<scene version="3.0.0">
     <integrator type="path"><integer name="max_depth" value="8"/></integrator>
     <sensor type="perspective">
-        <float name="fov" value="{FOV}"/>
-        <string name="fov_axis" value="smaller"/>
+        <float name="fov" value="{fov}"/>
+        <string name="fov_axis" value="{fov_axis}"/>
         <float name="near_clip" value="{near}"/>
         <float name="far_clip" value="{far}"/>
-        <transform name="to_world"><lookat origin="{eye}" target="{center}" up="{up}"/></transform>
+        <transform name="to_world">{to_world}</transform>
         <film type="hdrfilm"><integer name="width" value="1024"/><integer name="height" value="768"/></film>
         <sampler type="stratified"><integer name="sample_count" value="64"/></sampler>
     </sensor>
@@ -104,17 +201,49 @@ fn scene(plugin: &str, path: &Path, (min, max): (Vec3, Vec3), up: Vec3) -> Strin
     </shape>
     <shape type="{plugin}">
         <string name="filename" value="{file}"/>
-        <bsdf type="twosided"><bsdf type="diffuse"><rgb name="reflectance" value="0.65, 0.6, 0.52"/></bsdf></bsdf>
+        <boolean name="face_normals" value="{flat}"/>
+        <bsdf type="twosided"><bsdf type="diffuse">{reflectance}</bsdf></bsdf>
     </shape>
 </scene>"#,
-        eye = point(eye),
-        center = point(center),
-        up = point(up),
         key = point(key),
         key_radius = 0.6 * radius,
         ground_size = 40.0 * radius,
         ground = point(ground),
         ground_up = point(ground + radius * up),
         front = point(front),
+        // A glTF without normals is meant to be flat; other formats leave them to be computed.
+        flat = plugin == "gltf" && subject.mesh.normals.is_empty(),
+        reflectance = reflectance(subject.mesh),
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::description::Kind;
+
+    fn describe(name: &str, text: &str) -> Description {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        describe_mesh(&path, UpAxis::Y, &Options::default()).unwrap()
+    }
+
+    const PLY: &str = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n\
+        property float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n\
+        element face 1\nproperty list uchar int vertex_indices\nend_header\n\
+        0 0 0 255 0 0\n1 0 0 0 255 0\n0 1 0 0 0 255\n3 0 1 2\n";
+
+    #[test]
+    fn a_mesh_with_vertex_colours_shows_them() {
+        let mesh = |scene: &Description| {
+            let shape = scene.root().children(Kind::Shape)[2];
+            let twosided = shape.children(Kind::Bsdf)[0];
+            let diffuse = twosided.children(Kind::Bsdf)[0];
+            !diffuse.children(Kind::Texture).is_empty()
+        };
+        assert!(mesh(&describe("colored.ply", PLY)));
+        let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+        assert!(!mesh(&describe("plain.obj", obj)));
+    }
 }

@@ -1,78 +1,23 @@
-//! From a description to a scene: shapes are loaded in parallel, materials and lights made from their
-//! properties, and all that is wrong is gathered before any of it is reported.
+//! From a description and its loaded shapes to a scene: materials and lights are made from their properties,
+//! and all that is wrong is gathered before any of it is reported.
 
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use rayon::prelude::*;
-
-use super::{LightId, MaterialId, Scene, Surfacing};
+use super::assets::Member;
+use super::{Assets, LightId, MaterialId, Scene, Surfacing};
 use crate::accel::{Method, Tracer};
 use crate::color::ColorModel;
-use crate::description::{Description, Kind, NodeId, Properties};
-use crate::error::{Error, Problem, Problems, Result};
+use crate::description::{Description, Kind, NodeId, Properties, Value};
+use crate::error::{Error, Problems, Result};
 use crate::light::{Light, LightContext};
 use crate::material::Material;
-use crate::shape::{self, Geometry, Shape};
+use crate::shape::Geometry;
 use crate::texture::Palettes;
 
-/// The geometry of a scene, loaded: it does not depend on colour, sensor or film.
-#[derive(Debug)]
-pub struct Assets {
-    /// Each shape's node, in file order.
-    nodes: Vec<NodeId>,
-    /// Each shape's geometry in world space.
-    geometry: Vec<Arc<Geometry>>,
-    warnings: Vec<Problem>,
-}
-
-impl Assets {
-    /// Loads the shapes of a scene, several at once; `loaded` is called after each.
-    pub fn load(description: &Description, loaded: &(impl Fn() + Sync)) -> Result<Self> {
-        let shapes = description.root().children(Kind::Shape);
-        let results: Vec<Result<Shape>> = shapes
-            .par_iter()
-            .map(|properties| {
-                let shape = shape::build(properties);
-                loaded();
-                shape
-            })
-            .collect();
-        let mut problems = Problems::default();
-        let (mut geometry, mut warnings) = (Vec::with_capacity(shapes.len()), Vec::new());
-        for shape in results.into_iter().filter_map(|r| problems.take(r)) {
-            geometry.push(Arc::new(shape.geometry));
-            warnings.extend(shape.warnings);
-        }
-        problems.finish()?;
-        Ok(Self {
-            nodes: shapes.iter().map(Properties::node_id).collect(),
-            geometry,
-            warnings,
-        })
-    }
-
-    /// What the user should know of the files.
-    pub fn warnings(&self) -> &[Problem] {
-        &self.warnings
-    }
-
-    /// Triangles and other primitives.
-    pub fn primitive_count(&self) -> u64 {
-        self.geometry
-            .iter()
-            .map(|g| u64::from(g.primitive_count()))
-            .sum()
-    }
-
-    /// Bytes held.
-    pub fn bytes(&self) -> usize {
-        self.geometry.iter().map(|g| g.bytes()).sum()
-    }
-}
-
 /// What is made while a scene is built.
-struct Builder<C: ColorModel> {
+struct Builder<'d, C: ColorModel> {
+    description: &'d Description,
     palettes: Palettes<C>,
     materials: Vec<Material<C>>,
     /// The materials that were made already, by node.
@@ -81,7 +26,7 @@ struct Builder<C: ColorModel> {
     problems: Problems,
 }
 
-impl<C: ColorModel> Builder<C> {
+impl<C: ColorModel> Builder<'_, C> {
     fn add_material(&mut self, material: Material<C>) -> MaterialId {
         self.materials.push(material);
         MaterialId(self.materials.len() as u32 - 1)
@@ -131,6 +76,39 @@ impl<C: ColorModel> Builder<C> {
         children.first().copied()
     }
 
+    /// That the shape has the attributes that textures in `user` look for.
+    fn check_attributes(
+        &mut self,
+        shape: &Properties<'_>,
+        geometry: &Geometry,
+        user: &Properties<'_>,
+    ) {
+        let mesh = geometry.mesh();
+        let has = |name: &str| mesh.is_some_and(|m| m.attributes.iter().any(|a| a.name == name));
+        if let (Kind::Texture, "mesh_attribute") = (user.kind(), user.plugin())
+            && let Ok(Some(name)) = user.string("name")
+            && !has(name)
+        {
+            let attributes = mesh.map_or(&[][..], |m| &m.attributes);
+            let names: Vec<&str> = attributes.iter().map(|a| a.name.as_str()).collect();
+            let error = user.error("name", format!("the shape has no attribute {name:?}"));
+            let error = error.suggest(name, names.iter().copied());
+            self.problems.push(
+                if names.is_empty() {
+                    error
+                } else {
+                    error.help(format!("it has {}", names.join(", ")))
+                }
+                .related(shape.location(), "this shape"),
+            );
+        }
+        for property in user.all() {
+            if let Value::Object(id) = property.value {
+                self.check_attributes(shape, geometry, &self.description.node(id));
+            }
+        }
+    }
+
     fn surfacing(
         &mut self,
         properties: &Properties<'_>,
@@ -138,6 +116,9 @@ impl<C: ColorModel> Builder<C> {
     ) -> Option<Surfacing> {
         let emitter = self.single(properties, Kind::Emitter);
         let bsdf = self.single(properties, Kind::Bsdf);
+        for user in emitter.iter().chain(&bsdf) {
+            self.check_attributes(properties, geometry, user);
+        }
         let light = match &emitter {
             Some(emitter) if emitter.plugin() != "area" => {
                 let error = Error::input(format!(
@@ -170,6 +151,7 @@ pub fn build<C: ColorModel>(
     method: Method,
 ) -> Result<Scene<C>> {
     let mut builder = Builder {
+        description,
         palettes: Palettes::new(color.clone()),
         materials: Vec::new(),
         known: HashMap::new(),
@@ -177,8 +159,8 @@ pub fn build<C: ColorModel>(
         problems: Problems::default(),
     };
     let root = description.root();
-    let mut surfacing = Vec::with_capacity(assets.nodes.len());
-    for (node, geometry) in assets.nodes.iter().zip(&assets.geometry) {
+    let mut surfacing = Vec::with_capacity(assets.shapes.len());
+    for Member { node, geometry, .. } in &assets.shapes {
         surfacing.extend(builder.surfacing(&description.node(*node), geometry));
     }
     let mut environment: Option<(LightId, Properties<'_>)> = None;
@@ -204,9 +186,9 @@ pub fn build<C: ColorModel>(
         materials, lights, ..
     } = builder;
     let tracer = Tracer::new(
-        assets.geometry.clone(),
-        &vec![0; surfacing.len()],
-        Vec::new(),
+        assets.shapes.iter().map(|s| s.geometry.clone()).collect(),
+        &assets.shapes.iter().map(|s| s.group).collect::<Vec<_>>(),
+        assets.instances.clone(),
         method,
     );
     Ok(Scene {

@@ -1,6 +1,7 @@
 //! Everything that light meets, ready to be rendered: the tracer over all shapes, which material and
 //! which light each shape has, and the questions that an integrator asks.
 
+mod assets;
 mod build;
 
 use glam::{Vec2, Vec3};
@@ -11,7 +12,8 @@ use crate::interaction::{Hit, Interaction, Ray};
 use crate::light::{Light, LightSample};
 use crate::material::Material;
 
-pub use build::{Assets, build};
+pub use assets::Assets;
+pub use build::build;
 
 /// A material's place in its scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -160,6 +160,8 @@ impl Surface for TriangleMesh {
             position,
             normal,
             uv,
+            primitive: triangle,
+            barycentric: Vec2::new(b[1], b[2]),
             pdf,
         })
     }
@@ -198,8 +200,8 @@ pub(super) fn place(mut mesh: Mesh, properties: &Properties<'_>) -> Result<Shape
     Ok(shape)
 }
 
-/// Reads the file that a mesh plugin names, with that plugin's own options.
-pub(super) fn load(properties: &Properties<'_>) -> Result<Shape> {
+/// Reads the file that a mesh plugin names, with that plugin's own `options`.
+pub(super) fn load(properties: &Properties<'_>, options: ReadOptions) -> Result<Shape> {
     let Some(path) = properties.file("filename")? else {
         return Err(properties
             .error(
@@ -211,7 +213,7 @@ pub(super) fn load(properties: &Properties<'_>) -> Result<Shape> {
     let flip_tex_coords = properties.boolean("flip_tex_coords")?;
     let options = ReadOptions {
         flip_tex_coords,
-        ..ReadOptions::default()
+        ..options
     };
     let loaded = read(&path, &options).map_err(|e| e.at(properties.location()))?;
     let mut shape = place(loaded.mesh, properties)?;

@@ -1,13 +1,18 @@
 //! Shapes: what a scene's `<shape>` plugins build. Most build a triangle mesh, some a surface with an
 //! equation of its own; everything above sees a [`Geometry`].
 
+mod cylinder;
+mod disk;
 mod mesh;
 mod sphere;
 
 mod cube;
+mod gltf;
 mod obj;
 mod ply;
 mod rectangle;
+mod serialized;
+mod stl;
 
 use glam::{DMat4, Vec2, Vec3};
 
@@ -16,7 +21,10 @@ use crate::error::{Problem, Result};
 use crate::family;
 use crate::interaction::{Hit, Interaction, Ray};
 use crate::math::Transform;
+use crate::mesh::Mesh;
 
+pub use cylinder::Cylinder;
+pub use disk::Disk;
 pub use mesh::TriangleMesh;
 pub use sphere::Sphere;
 
@@ -87,6 +95,10 @@ pub struct SurfaceSample {
     pub normal: Vec3,
     /// Texture coordinates.
     pub uv: Vec2,
+    /// The primitive.
+    pub primitive: u32,
+    /// The second and third barycentric coordinate on a triangle.
+    pub barycentric: Vec2,
     /// Density per solid angle at the other point, in 1/sr.
     pub pdf: f32,
 }
@@ -118,8 +130,22 @@ pub trait Surface: std::fmt::Debug + Send + Sync {
 pub enum Geometry {
     /// Triangles.
     Mesh(TriangleMesh),
+    /// A cylinder without caps.
+    Cylinder(Cylinder),
+    /// A disk.
+    Disk(Disk),
     /// A sphere.
     Sphere(Sphere),
+}
+
+impl Geometry {
+    /// The triangles, if it is made of them.
+    pub fn mesh(&self) -> Option<&Mesh> {
+        match self {
+            Self::Mesh(mesh) => Some(mesh.mesh()),
+            _ => None,
+        }
+    }
 }
 
 impl std::ops::Deref for Geometry {
@@ -128,6 +154,8 @@ impl std::ops::Deref for Geometry {
     fn deref(&self) -> &Self::Target {
         match self {
             Self::Mesh(mesh) => mesh,
+            Self::Cylinder(cylinder) => cylinder,
+            Self::Disk(disk) => disk,
             Self::Sphere(sphere) => sphere,
         }
     }
@@ -156,15 +184,27 @@ type Build = fn(&Properties<'_>) -> Result<Shape>;
 /// The shape plugins.
 const PLUGINS: &[(&str, Build)] = &[
     ("cube", cube::build),
+    ("cylinder", cylinder::build),
+    ("disk", disk::build),
+    ("gltf", gltf::build),
     ("obj", obj::build),
     ("ply", ply::build),
     ("rectangle", rectangle::build),
+    ("serialized", serialized::build),
     ("sphere", sphere::build),
+    ("stl", stl::build),
 ];
+
+/// Shapes made of shapes, which the scene puts together: several in a space of their own, and those once
+/// more in the world.
+pub const GROUP: &str = "shapegroup";
+/// See [`GROUP`].
+pub const INSTANCE: &str = "instance";
 
 /// The names of the plugins, as scene files write them.
 pub fn names() -> Vec<&'static str> {
-    PLUGINS.iter().map(|(name, _)| *name).collect()
+    let single = PLUGINS.iter().map(|(name, _)| *name);
+    single.chain([GROUP, INSTANCE]).collect()
 }
 
 /// Builds the shape that `properties` names.
@@ -200,3 +240,6 @@ fn area_to_solid_angle(area: f64, from: Vec3, position: Vec3, normal: Vec3) -> f
         0.0
     }
 }
+
+#[cfg(test)]
+mod tests;

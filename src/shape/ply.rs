@@ -4,7 +4,8 @@
 use super::{Shape, mesh};
 use crate::description::Properties;
 use crate::error::Result;
+use crate::mesh::ReadOptions;
 
 pub(super) fn build(properties: &Properties<'_>) -> Result<Shape> {
-    mesh::load(properties)
+    mesh::load(properties, ReadOptions::default())
 }

@@ -45,7 +45,9 @@ pub(super) fn build(properties: &Properties<'_>) -> Result<Shape> {
         return Err(properties.error("radius", "a sphere needs a positive, finite radius"));
     }
     let [x, y, z] = axes.map(|a| (a / scale).as_vec3());
-    let flip_normals = properties.boolean("flip_normals")?.unwrap_or(false);
+    // As in Mitsuba, a mirroring transform turns a sphere's normals over, and no other shape's here.
+    let mirrored = axes[0].cross(axes[1]).dot(axes[2]) < 0.0;
+    let flip_normals = properties.boolean("flip_normals")?.unwrap_or(false) != mirrored;
     let sphere = Sphere {
         center,
         radius,
@@ -168,6 +170,8 @@ impl Surface for Sphere {
                 position,
                 normal: self.side() * outward,
                 uv: self.uv(outward),
+                primitive: 0,
+                barycentric: Vec2::ZERO,
                 pdf,
             };
             return (pdf > 0.0).then_some(sample);
@@ -196,6 +200,8 @@ impl Surface for Sphere {
             position,
             normal: self.side() * outward,
             uv: self.uv(outward),
+            primitive: 0,
+            barycentric: Vec2::ZERO,
             pdf,
         })
     }

@@ -3,6 +3,7 @@
 
 mod bitmap;
 mod checkerboard;
+mod mesh_attribute;
 mod picture;
 mod uniform;
 
@@ -39,6 +40,7 @@ family! {
     pub enum Texture<C>: Pattern, kind "texture", context Palette<C> {
         "bitmap" => Bitmap(bitmap::Bitmap<C>),
         "checkerboard" => Checkerboard(checkerboard::Checkerboard<C>),
+        "mesh_attribute" => MeshAttribute(mesh_attribute::MeshAttribute<C>),
         "uniform" => Uniform(uniform::Uniform<C>),
     }
 }

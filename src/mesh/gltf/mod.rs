@@ -12,8 +12,8 @@ use glam::{DMat4, DVec4, Vec2, Vec3};
 use gltf::mesh::Mode;
 use gltf::{Document, Node, Primitive, Semantic};
 
-use super::Mesh;
 use super::read::{Decoded, Input, Loaded, ReadOptions, open, warnings};
+use super::{Attribute, Mesh, Per};
 use crate::error::{Error, Location, Problem, Result};
 use buffers::{Buffers, Container};
 
@@ -115,11 +115,21 @@ pub fn read_gltf(path: &Path, options: &ReadOptions) -> Result<GltfScene> {
     Ok(scene)
 }
 
-/// All parts as one mesh.
+/// All parts as one mesh; where the file gives base colours, they are its attribute `face_color`.
 pub(super) fn read(input: Input<'_>, options: &ReadOptions) -> Result<Decoded> {
     let walk = walk(input, options)?;
+    let colored = walk.parts.iter().any(|part| part.base_color != [1.0; 4]);
     let mut mesh = Mesh::default();
-    for part in walk.parts {
+    for mut part in walk.parts {
+        if colored {
+            let [r, g, b, _] = part.base_color;
+            part.mesh.attributes.push(Attribute {
+                name: "face_color".to_owned(),
+                channels: 3,
+                per: Per::Face,
+                values: [r, g, b].repeat(part.mesh.triangles.len()),
+            });
+        }
         mesh.append(part.mesh);
     }
     Ok(Decoded {

@@ -1,0 +1,12 @@
+//! `gltf`: the default scene of a glTF or GLB file `filename` as one mesh, with `to_world`, `face_normals`,
+//! `flip_normals` and `flip_tex_coords`; the materials' base colours are its attribute `face_color`. Étendue's
+//! own: Mitsuba has no such shape.
+
+use super::{Shape, mesh};
+use crate::description::Properties;
+use crate::error::Result;
+use crate::mesh::ReadOptions;
+
+pub(super) fn build(properties: &Properties<'_>) -> Result<Shape> {
+    mesh::load(properties, ReadOptions::default())
+}

@@ -1,0 +1,322 @@
+//! What every surface with an equation of its own must do, looped over them, and Mitsuba's numbers.
+
+use std::f64::consts::PI;
+use std::path::Path;
+
+use super::*;
+use crate::description::{Description, Options};
+use crate::math::{random, warp};
+
+const TILTED: &str = r#"<rotate x="1" angle="30"/><translate x="0.5" y="-2" z="1"/></transform>"#;
+
+/// Scene text of each, with its area.
+fn surfaces() -> Vec<(String, f64)> {
+    let placed = |plugin: &str, scale: &str, more: &str| {
+        format!(
+            r#"<shape type="{plugin}">{more}<transform name="to_world"><scale value="{scale}"/>{TILTED}</shape>"#
+        )
+    };
+    let flipped = r#"<boolean name="flip_normals" value="true"/>"#;
+    let ends = r#"<point name="p0" value="1, 0, 0"/><point name="p1" value="1, 2, 1"/>"#;
+    // The circumference of an ellipse of half axes 1 and 2.
+    let ellipse = 9.688_448_220_547_675;
+    vec![
+        (placed("sphere", "2", ""), 16.0 * PI),
+        (placed("sphere", "-1, 1, 1", flipped), 4.0 * PI),
+        (placed("disk", "1", ""), PI),
+        (placed("disk", "-3, 0.5, 7", flipped), 1.5 * PI),
+        (placed("cylinder", "1", flipped), 2.0 * PI),
+        (placed("cylinder", "2", ends), 8.0 * PI * 5f64.sqrt()),
+        (placed("cylinder", "1, 2, -3", ""), 3.0 * ellipse),
+    ]
+}
+
+fn geometry(text: &str) -> Geometry {
+    let text = format!(r#"<scene version="3.0.0">{text}</scene>"#);
+    let scene = Description::parse(&text, Path::new("test.xml"), &Options::default()).unwrap();
+    let shape = build(&scene.root().children(Kind::Shape)[0]).unwrap();
+    assert_eq!(scene.unread(), []);
+    shape.geometry
+}
+
+fn point(seed: u64, i: u32) -> Vec2 {
+    let unit = |n| random::unit(random::bits(seed, n));
+    Vec2::new(unit(2 * i), unit(2 * i + 1))
+}
+
+fn ray(origin: Vec3, target: Vec3) -> Ray {
+    Ray {
+        origin,
+        direction: (target - origin).normalize(),
+        t_max: f32::INFINITY,
+        time: 0.0,
+    }
+}
+
+/// The first hit on a surface of one primitive.
+fn meet<'g>(geometry: &'g Geometry, ray: &Ray) -> Option<Interaction<'g>> {
+    let (t, u, v) = geometry.intersect(0, ray)?;
+    let hit = Hit {
+        t,
+        u,
+        v,
+        instance: Hit::NONE,
+        shape: 0,
+        primitive: 0,
+    };
+    Some(geometry.interaction(ray, &hit))
+}
+
+/// Where the surface is looked at from.
+fn viewpoints(geometry: &Geometry) -> Vec<Vec3> {
+    let Bounds { min, max } = geometry.bounds(0);
+    let (center, size) = (0.5 * (min + max), (max - min).length());
+    let around = (0..6).map(|i| center + size * 0.9 * warp::uniform_sphere(point(7, i)));
+    around.chain([center + Vec3::splat(0.01)]).collect()
+}
+
+#[test]
+fn every_surface_has_its_area_and_lies_in_its_box() {
+    for (text, area) in surfaces() {
+        let geometry = geometry(&text);
+        assert!((geometry.area() / area - 1.0).abs() < 1e-6, "{text}");
+        let bounds = geometry.bounds(0);
+        let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        for i in 0..20_000 {
+            let sample = geometry.sample(Vec3::splat(30.0), point(1, i));
+            for p in sample.into_iter().map(|s| s.position) {
+                assert!(
+                    p.cmpge(bounds.min).all() && p.cmple(bounds.max).all(),
+                    "{text}"
+                );
+                (low, high) = (low.min(p), high.max(p));
+            }
+        }
+        // A sphere is only drawn where it is seen.
+        if !text.contains("sphere") {
+            let slack = (bounds.max - bounds.min) - (high - low);
+            assert!(slack.max_element() < 0.05, "{text}: the box is too large");
+        }
+    }
+}
+
+#[test]
+fn every_surface_is_met_where_it_is_drawn_with_the_same_normal_uv_and_density() {
+    for (text, _) in surfaces() {
+        let geometry = geometry(&text);
+        for from in viewpoints(&geometry) {
+            let mut seen = 0;
+            for i in 0..2000 {
+                let Some(sample) = geometry.sample(from, point(2, i)) else {
+                    continue;
+                };
+                let ray = ray(from, sample.position);
+                let Some(at) = meet(&geometry, &ray) else {
+                    continue; // it grazes
+                };
+                let scale = from.distance(sample.position);
+                if at.position.distance(sample.position) > 1e-4 * scale {
+                    continue; // it stands in its own way
+                }
+                seen += 1;
+                assert!(at.position.distance(ray.at(at.t)) < 1e-4 * scale, "{text}");
+                assert!(at.normal.dot(sample.normal) > 0.999, "{text}");
+                assert!((at.uv - sample.uv).abs().max_element() < 0.01 || at.uv.x < 0.01);
+                assert!(at.uv.cmpge(Vec2::ZERO).all() && at.uv.cmple(Vec2::ONE).all());
+                if at.wi.z.abs() > 0.05 {
+                    let ratio = geometry.pdf(from, &at) / sample.pdf;
+                    assert!((ratio - 1.0).abs() < 0.02, "{text}: {ratio}");
+                }
+            }
+            assert!(seen > 600, "{text}: {seen}");
+        }
+    }
+}
+
+#[test]
+fn the_reciprocal_density_of_light_samples_adds_up_to_the_area() {
+    for (text, _) in surfaces()
+        .into_iter()
+        .filter(|(t, _)| !t.contains("sphere"))
+    {
+        let geometry = geometry(&text);
+        for from in viewpoints(&geometry) {
+            let n = 4000;
+            let sum: f64 = (0..n)
+                .filter_map(|i| geometry.sample(from, point(3, i)))
+                .map(|s| {
+                    let way = s.position - from;
+                    let cosine = s.normal.dot(way.normalize()).abs();
+                    f64::from(way.length_squared() / (cosine * s.pdf))
+                })
+                .sum();
+            let ratio = sum / f64::from(n) / geometry.area();
+            assert!((ratio - 1.0).abs() < 0.03, "{text}: {ratio}");
+        }
+    }
+}
+
+#[test]
+fn positions_change_with_u_and_v_as_the_tangents_say() {
+    for (text, _) in surfaces() {
+        let geometry = geometry(&text);
+        let (from, mut tried) = (viewpoints(&geometry)[0], 0);
+        for i in 0..400 {
+            let Some(at) = (geometry.sample(from, point(4, i)))
+                .and_then(|s| meet(&geometry, &ray(from, s.position)))
+            else {
+                continue;
+            };
+            for (tangent, expected) in [(at.dp_du, Vec2::X), (at.dp_dv, Vec2::Y)] {
+                let step = 1e-3 / tangent.length().max(1.0);
+                let target = at.position + step * tangent;
+                let near = meet(&geometry, &ray(target + 0.1 * at.normal, target));
+                let Some(near) = near.filter(|n| n.position.distance(target) < 1e-4) else {
+                    continue;
+                };
+                let change = (near.uv - at.uv) / step;
+                let flat = at.uv.y > 0.1 && at.uv.y < 0.9 && at.uv.x > 0.1 && at.uv.x < 0.9;
+                if flat {
+                    tried += 1;
+                    assert!(
+                        change.distance(expected) < 0.03,
+                        "{text} {}: {change}",
+                        at.uv
+                    );
+                }
+            }
+        }
+        assert!(tried > 50, "{text}: {tried}");
+    }
+}
+
+/// A ray's origin and direction, and what Mitsuba 3.9.1 says of its hit.
+type Probe = (
+    [f32; 3],
+    [f32; 3],
+    f32,
+    [f32; 3],
+    [f32; 2],
+    [f32; 3],
+    [f32; 3],
+);
+
+#[test]
+fn hits_are_those_of_mitsuba() {
+    let ends = r#"<point name="p0" value="1, 0, 0"/><point name="p1" value="1, 2, 1"/><float name="radius" value="0.5"/>"#;
+    let scaled = |plugin: &str, scale: &str| {
+        format!(
+            r#"<shape type="{plugin}"><transform name="to_world"><scale value="{scale}"/></transform></shape>"#
+        )
+    };
+    let probes: [(String, Probe); 6] = [
+        (
+            scaled("disk", "1"),
+            (
+                [-0.3, -0.4, -2.0],
+                [0.0, 0.0, 1.0],
+                2.0,
+                [0.0, 0.0, 1.0],
+                [0.5, 0.647_584],
+                [-0.6, -0.8, 0.0],
+                [2.513_27, -1.884_96, 0.0],
+            ),
+        ),
+        (
+            scaled("disk", "-1, 1, 1"),
+            (
+                [0.3, 0.4, 2.0],
+                [0.0, 0.0, -1.0],
+                2.0,
+                [0.0, 0.0, 1.0],
+                [0.5, 0.352_416],
+                [0.6, 0.8, 0.0],
+                [2.513_27, -1.884_96, 0.0],
+            ),
+        ),
+        (
+            scaled("sphere", "-1, 1, 1"),
+            (
+                [0.3, 0.4, 2.0],
+                [0.0, 0.0, -1.0],
+                1.133_974_6,
+                [-0.3, -0.4, -0.866_025],
+                [0.352_416, 0.166_667],
+                [2.513_27, -1.884_96, 0.0],
+                [1.632_42, 2.176_56, -std::f32::consts::FRAC_PI_2],
+            ),
+        ),
+        (
+            scaled("cylinder", "1.5, 1.5, 2"),
+            (
+                [3.0, 0.2, 0.3],
+                [-1.0, 0.0, 0.0],
+                1.513_393,
+                [0.991_071, 0.133_333, 0.0],
+                [0.021_284, 0.15],
+                [-1.256_64, 9.340_63, 0.0],
+                [0.0, 0.0, 2.0],
+            ),
+        ),
+        (
+            scaled("cylinder", "1, 1, -1"),
+            (
+                [3.0, 0.2, -0.3],
+                [-1.0, 0.0, 0.0],
+                2.020_203_8,
+                [0.979_796, 0.2, 0.0],
+                [0.032_047_1, 0.3],
+                [-1.256_64, 6.156_24, 0.0],
+                [0.0, 0.0, -1.0],
+            ),
+        ),
+        (
+            format!(r#"<shape type="cylinder">{ends}</shape>"#),
+            (
+                [3.0, 0.5, 0.3],
+                [-1.0, 0.0, 0.0],
+                1.502_004,
+                [0.995_992, -0.04, 0.08],
+                [0.985_746, 0.26],
+                [0.280_992, 1.399_33, -2.798_66],
+                [0.0, 2.0, 1.0],
+            ),
+        ),
+    ];
+    for (text, (origin, direction, t, normal, uv, dp_du, dp_dv)) in probes {
+        let geometry = geometry(&text);
+        let origin = Vec3::from_array(origin);
+        let at = meet(
+            &geometry,
+            &ray(origin, origin + Vec3::from_array(direction)),
+        )
+        .unwrap();
+        let near = |ours: Vec3, mitsuba: [f32; 3]| {
+            assert!(
+                ours.distance(Vec3::from_array(mitsuba)) < 1e-4,
+                "{text}: {ours} {mitsuba:?}"
+            );
+        };
+        near(Vec3::splat(at.t), [t; 3]);
+        near(at.normal, normal);
+        near(at.uv.extend(0.0), [uv[0], uv[1], 0.0]);
+        near(at.dp_du, dp_du);
+        near(at.dp_dv, dp_dv);
+    }
+}
+
+#[test]
+fn surfaces_of_no_extent_are_refused() {
+    for text in [
+        r#"<shape type="cylinder"><float name="radius" value="0"/></shape>"#,
+        r#"<shape type="cylinder"><point name="p0" value="0, 0, 1"/></shape>"#,
+        r#"<shape type="sphere"><float name="radius" value="-1"/></shape>"#,
+    ] {
+        let text = format!(r#"<scene version="3.0.0">{text}</scene>"#);
+        let scene = Description::parse(&text, Path::new("test.xml"), &Options::default()).unwrap();
+        assert!(
+            build(&scene.root().children(Kind::Shape)[0]).is_err(),
+            "{text}"
+        );
+    }
+}

@@ -1,0 +1,74 @@
+//! `mesh_attribute`: the attribute `name` (`vertex_…` or `face_…`) of the mesh that the texture lies on, times
+//! `scale`: one number or a linear BT.709 triple, interpolated over a triangle or the same on all of it.
+
+use super::{Palette, Pattern};
+use crate::color::{ColorModel, Role};
+use crate::description::Properties;
+use crate::error::Result;
+use crate::interaction::Interaction;
+use crate::mesh::{Attribute, Mesh, Per};
+
+/// A mesh's own colours.
+#[derive(Clone, Debug)]
+pub struct MeshAttribute<C: ColorModel> {
+    name: String,
+    scale: f32,
+    color: C,
+    role: Role,
+}
+
+impl<C: ColorModel> MeshAttribute<C> {
+    pub(super) fn build(properties: &Properties<'_>, palette: &Palette<C>) -> Result<Self> {
+        let Some(name) = properties.string("name")? else {
+            return Err(properties.error("name", "a mesh_attribute needs the attribute's name"));
+        };
+        if !name.starts_with("vertex_") && !name.starts_with("face_") {
+            let message =
+                format!("an attribute's name starts with vertex_ or face_, and {name:?} does not");
+            return Err(properties.error("name", message));
+        }
+        Ok(Self {
+            name: name.to_owned(),
+            scale: properties.float("scale")?.unwrap_or(1.0) as f32,
+            color: palette.color.clone(),
+            role: palette.role,
+        })
+    }
+}
+
+/// The attribute's first three numbers at a point, a single one three times.
+fn value(attribute: &Attribute, mesh: &Mesh, at: &Interaction<'_>) -> Option<[f32; 3]> {
+    let row = |i: u32| {
+        let first = i as usize * attribute.channels;
+        attribute.values.get(first..first + attribute.channels)
+    };
+    let rgb = |row: &[f32]| match *row {
+        [r, g, b, ..] => [r, g, b],
+        [v, ..] => [v; 3],
+        [] => [0.0; 3],
+    };
+    if attribute.per == Per::Face {
+        return row(at.primitive).map(rgb);
+    }
+    let [a, b, c] = mesh
+        .triangles
+        .get(at.primitive as usize)?
+        .map(|i| row(i).map(rgb));
+    let (a, b, c, [u, v]) = (a?, b?, c?, at.barycentric.to_array());
+    Some(std::array::from_fn(|i| {
+        (1.0 - u - v) * a[i] + u * b[i] + v * c[i]
+    }))
+}
+
+impl<C: ColorModel> Pattern<C> for MeshAttribute<C> {
+    fn eval(&self, at: &Interaction<'_>, wavelengths: &C::Wavelengths) -> C::Sample {
+        // That the shape has the attribute was checked while the scene was built.
+        let find = |mesh: &Mesh| {
+            let attribute = mesh.attributes.iter().find(|a| a.name == self.name)?;
+            value(attribute, mesh, at)
+        };
+        let rgb = at.mesh.and_then(find).unwrap_or_default();
+        let scaled = rgb.map(|v| if v.is_finite() { v * self.scale } else { 0.0 });
+        C::evaluate_texel(&self.color.texel(scaled, self.role), wavelengths)
+    }
+}
