@@ -9,11 +9,15 @@ mod diffuse;
 mod mask;
 mod null;
 mod plastic;
+mod roughconductor;
+mod roughdielectric;
+mod roughplastic;
 mod thindielectric;
 mod twosided;
 
 mod fresnel;
 mod ior;
+mod microfacet;
 
 use glam::{Vec2, Vec3};
 
@@ -138,6 +142,9 @@ family! {
         "mask" => Mask(mask::Mask<C>),
         "null" => Null(null::Null),
         "plastic" => Plastic(plastic::Plastic<C>),
+        "roughconductor" => RoughConductor(roughconductor::RoughConductor<C>),
+        "roughdielectric" => RoughDielectric(roughdielectric::RoughDielectric<C>),
+        "roughplastic" => RoughPlastic(roughplastic::RoughPlastic<C>),
         "thindielectric" => ThinDielectric(thindielectric::ThinDielectric<C>),
         "twosided" => TwoSided(twosided::TwoSided<C>),
     }
