@@ -9,12 +9,15 @@ mod diffuse;
 mod mask;
 mod null;
 mod plastic;
+mod principled;
+mod principledthin;
 mod roughconductor;
 mod roughdielectric;
 mod roughplastic;
 mod thindielectric;
 mod twosided;
 
+mod disney;
 mod fresnel;
 mod ior;
 mod microfacet;
@@ -142,6 +145,8 @@ family! {
         "mask" => Mask(mask::Mask<C>),
         "null" => Null(null::Null),
         "plastic" => Plastic(plastic::Plastic<C>),
+        "principled" => Principled(principled::Principled<C>),
+        "principledthin" => PrincipledThin(principledthin::PrincipledThin<C>),
         "roughconductor" => RoughConductor(roughconductor::RoughConductor<C>),
         "roughdielectric" => RoughDielectric(roughdielectric::RoughDielectric<C>),
         "roughplastic" => RoughPlastic(roughplastic::RoughPlastic<C>),
