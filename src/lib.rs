@@ -2,24 +2,26 @@
 //! through trees and writes images that agree with Mitsuba's. `ARCHITECTURE.md` says how it is built;
 //! the modules stand here in reading order, and each imports only from those above it.
 
-pub mod color;
 pub mod error;
-pub(crate) mod family;
+
 pub mod math;
+
+pub mod color;
 
 pub mod description;
 pub mod image;
 pub mod mesh;
 
+pub(crate) mod family;
 pub mod interaction;
 
+pub mod display;
 pub mod filter;
 pub mod sampler;
-pub mod sensor;
 pub mod shape;
 pub mod texture;
 
-pub mod display;
+pub mod sensor;
 
 pub mod accel;
 pub mod light;

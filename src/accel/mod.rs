@@ -21,7 +21,7 @@ use group::{Group, Item};
 use triangle::Shear;
 
 /// What tracing costs, counted: the same on every machine.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Counts {
     /// Tree nodes entered.
     pub node_steps: u64,

@@ -137,3 +137,56 @@ fn a_closed_mesh_has_no_hole_at_vertices_and_edges() {
     tracer.closest(&rays, &mut hits, &mut counts);
     assert_eq!(hits.iter().filter(|h| h.is_miss()).count(), 0);
 }
+
+/// Rays that leave a large, nearly flat surface at every angle, at scales from 10⁻⁵ to 10⁵ and away from
+/// the origin: the surface must not shadow itself.
+#[test]
+fn a_ray_never_meets_the_surface_that_it_leaves() {
+    for decade in -5..=5 {
+        let scale = 10f64.powi(decade);
+        for (turn, shift) in [
+            (0.0, 0.0),
+            (1e-7, 0.0),
+            (0.3, 0.0),
+            (0.7, 3.0),
+            (1e-7, -20.0),
+        ] {
+            let place = DMat4::from_translation(DVec3::splat(shift * scale))
+                * DMat4::from_rotation_x(turn)
+                * DMat4::from_rotation_z(turn * 0.7)
+                * DMat4::from_scale(DVec3::splat(scale));
+            let mut floor = mesh::rectangle();
+            floor.transform(&place);
+            let shapes = vec![Arc::new(Geometry::Mesh(TriangleMesh::new(floor)))];
+            let tracer = Tracer::new(shapes, &[0], Vec::new(), Method::Tree);
+            let n = 4000;
+            let mut again = 0;
+            for i in 0..n {
+                let place = Transform::new(&place).unwrap();
+                let above = place.point(Vec3::new(uniform(1, i) - 0.5, uniform(2, i) - 0.5, 1.0));
+                let down = place.vector(Vec3::NEG_Z).normalize();
+                let ray = Ray {
+                    origin: above,
+                    direction: down,
+                    t_max: f32::INFINITY,
+                    time: 0.0,
+                };
+                let (mut hits, mut counts) = (Vec::new(), Counts::default());
+                tracer.closest(&[ray], &mut hits, &mut counts);
+                assert!(!hits[0].is_miss());
+                let at = tracer.interaction(&ray, &hits[0]);
+                // Upward, half of them within a thousandth of the horizon.
+                let up = warp::cosine_hemisphere(Vec2::new(uniform(3, i), uniform(4, i)));
+                let up = if i % 2 == 0 {
+                    up
+                } else {
+                    Vec3::new(up.x, up.y, 1e-3 * up.z).normalize()
+                };
+                let leaving = at.spawn(at.frame.to_world(up));
+                tracer.closest(&[leaving], &mut hits, &mut counts);
+                again += usize::from(!hits[0].is_miss());
+            }
+            assert_eq!(again, 0, "scale 1e{decade}, turn {turn}, shift {shift}");
+        }
+    }
+}

@@ -2,10 +2,14 @@
 //! intersection*, 2013). Edge functions are differences of two products that are rounded one by one,
 //! never fused: rounding is monotonic, so their sign is right wherever it is not zero, and zero counts
 //! as inside.
+//!
+//! A distance that could be negative but for rounding is no hit (Pharr, Jakob and Humphreys, *PBRT* 4th
+//! ed., 6.8.7): a ray that starts on a triangle, or on a neighbour in the same plane, does not meet it.
 
 use glam::Vec3;
 
 use crate::interaction::Ray;
+use crate::math::offset::gamma;
 
 /// A ray prepared for triangles: the axis along which it mostly goes becomes z, and a shear makes it
 /// that axis.
@@ -64,6 +68,47 @@ impl Shear {
         }
         let inverse = 1.0 / determinant;
         let t = (u * a.2 + v * b.2 + w * c.2) * self.shear[2] * inverse;
-        (t > 0.0 && t <= limit).then_some((t, v * inverse, w * inverse))
+        if !(t > 0.0 && t <= limit) {
+            return None;
+        }
+        let largest = |a: f32, b: f32, c: f32| a.abs().max(b.abs()).max(c.abs());
+        let (x, y) = (largest(a.0, b.0, c.0), largest(a.1, b.1, c.1));
+        let (z, edge) = (largest(a.2, b.2, c.2), largest(u, v, w));
+        let error = t_error([x, y, z * self.shear[2].abs()], edge) * inverse.abs();
+        (t > error).then_some((t, v * inverse, w * inverse))
+    }
+}
+
+/// A bound on the rounding error of t times the determinant, for coordinates and edge functions up to these
+/// magnitudes.
+fn t_error([x, y, z]: [f32; 3], edge: f32) -> f32 {
+    let (dx, dy, dz) = (gamma(5) * (x + z), gamma(5) * (y + z), gamma(3) * z);
+    let edge_error = 2.0 * (gamma(2) * x * y + dy * x + dx * y);
+    3.0 * (gamma(3) * edge * z + edge_error * z + dz * edge)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ray_that_starts_on_a_floor_at_height_zero_does_not_meet_it() {
+        let (a, b) = (Vec3::new(-10.0, -10.0, 0.0), Vec3::new(10.0, 10.0, 0.0));
+        let floor = [
+            [a, Vec3::new(10.0, -10.0, 0.0), b],
+            [a, b, Vec3::new(-10.0, 10.0, 0.0)],
+        ];
+        for i in 0..2000 {
+            let angle = i as f32;
+            let ray = Ray {
+                origin: Vec3::new(3.7 * angle.sin(), 2.9 * (1.7 * angle).cos(), 0.0),
+                direction: Vec3::new(angle.cos(), angle.sin(), 0.3 * (i % 7) as f32).normalize(),
+                t_max: f32::INFINITY,
+                time: 0.0,
+            };
+            for corners in floor {
+                assert_eq!(Shear::new(&ray).intersect(corners, f32::INFINITY), None);
+            }
+        }
     }
 }

@@ -1,11 +1,14 @@
-//! A progress bar on standard error, where that is a terminal.
+//! A progress bar on standard error, where that is a terminal; and the way by which a signal or a time
+//! limit reaches the render.
 
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use etendue::render::{Phase, Progress};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+use super::stop::Stop;
 
 /// Shows the phases of one render after another.
 pub(super) struct Bar {
@@ -15,11 +18,14 @@ pub(super) struct Bar {
     samples: AtomicU64,
     /// When the phase began, and when its rates were last shown.
     clock: Mutex<(Instant, Instant)>,
+    stop: Stop,
+    /// Whether it was said that the render is coming to an end.
+    said: AtomicBool,
 }
 
 impl Bar {
     /// For the render called `name`; hidden where `quiet`, and where standard error is no terminal.
-    pub(super) fn new(name: &str, quiet: bool) -> Self {
+    pub(super) fn new(name: &str, quiet: bool, stop: Stop) -> Self {
         let target = if quiet {
             ProgressDrawTarget::hidden()
         } else {
@@ -31,6 +37,8 @@ impl Bar {
             rays: AtomicU64::new(0),
             samples: AtomicU64::new(0),
             clock: Mutex::new((Instant::now(), Instant::now())),
+            stop,
+            said: AtomicBool::new(false),
         }
     }
 
@@ -80,5 +88,14 @@ impl Progress for Bar {
                 rate(rays)
             ));
         }
+    }
+
+    fn stop(&self) -> bool {
+        let asked = self.stop.asked();
+        if asked && self.stop.signalled() && !self.said.swap(true, Ordering::Relaxed) {
+            self.bar
+                .println("finishing the tiles under way; a second signal ends at once");
+        }
+        asked
     }
 }

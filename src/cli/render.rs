@@ -1,90 +1,131 @@
 //! `etendue render`: scenes or bare meshes to images.
 
 use std::num::NonZeroUsize;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
 use etendue::accel::Method;
-use etendue::description::{self, Description};
-use etendue::error::{Error, Result};
-use etendue::render::{self, Colors, Options, Overrides, Rendered, UpAxis, human_duration};
+use etendue::description::{self, Description, Value};
+use etendue::display;
+use etendue::error::{Error, Problem, Result};
+use etendue::render::{Checkpoint, Colors, Options, Overrides, Rendered, Session};
 use etendue::sensor::Window;
-use etendue::{display, image};
+use glam::DMat4;
 
+use super::batch::{Batch, Item, Request, Sensors};
+use super::memory;
+use super::parse::{self, Frames};
 use super::progress::Bar;
-use super::{output, report};
+use super::scene::{SceneArguments, sensors};
+use super::stop::Stop;
+use super::summary::{self, Ending, Style};
+use super::turntable::turn;
+use super::{output, report, status};
 
 /// Render scenes or meshes to images
 ///
 /// INPUT is a Mitsuba 3 scene (.xml) or a bare mesh (.ply, .obj), which gets an automatic camera on a
 /// ground under a soft sky. The extension of OUT says the format: .exr (linear, float32, with metadata and
 /// all channels), .hdr (linear) or .png (sRGB).
+///
+/// Ctrl-C, SIGTERM and SIGHUP end a render early: the tiles under way are finished and the image of what
+/// is complete is written. A second signal ends the process at once.
 #[derive(Args, Debug)]
-#[command(after_help = EXAMPLES)]
+#[command(after_help = format!("{EXAMPLES}\n\n{}", status::HELP))]
 pub(super) struct Arguments {
     /// Scene files (.xml) or meshes (.ply, .obj)
     #[arg(required = true, value_name = "INPUT")]
     inputs: Vec<PathBuf>,
-    /// Where the image goes; {name} stands for the input's name, for several inputs
+    /// Where the image goes; {name} stands for the input's name, {frame} or {frame:04} for the frame's
+    /// number, {sensor} for the sensor's id or number
     #[arg(short, long, value_name = "OUT")]
     output: String,
+    #[command(flatten)]
+    scene: SceneArguments,
+
     /// Samples a pixel, in place of the scene's sample_count; the sampler may round up
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = IMAGE)]
     spp: Option<u32>,
     /// Seed of the random numbers: one seed, one image
-    #[arg(long, default_value_t = 0, value_name = "N")]
+    #[arg(long, default_value_t = 0, value_name = "N", help_heading = IMAGE)]
     seed: u64,
-    /// Threads; one a processor by default. The image does not depend on it
-    #[arg(long, value_name = "N")]
-    threads: Option<NonZeroUsize>,
     /// Size of the film in pixels
-    #[arg(long, value_name = "WxH", value_parser = size)]
+    #[arg(long, value_name = "WxH", value_parser = parse::size, help_heading = IMAGE)]
     size: Option<(u32, u32)>,
     /// Render only this part of the film; equals the same pixels of the full image
-    #[arg(long, value_name = "X,Y,W,H", value_parser = crop)]
+    #[arg(long, value_name = "X,Y,W,H", value_parser = parse::crop, help_heading = IMAGE)]
     crop: Option<Window>,
-    /// Value of a $name parameter of the scene
-    #[arg(short = 'D', value_name = "NAME=VALUE", value_parser = define)]
-    define: Vec<(String, String)>,
     /// Integrator, in place of the scene's
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help_heading = IMAGE)]
     integrator: Option<String>,
     /// The integrator's max_depth: 1 is emission only, 2 direct light, -1 no limit
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, help_heading = IMAGE)]
     max_depth: Option<i64>,
     /// Sampler, in place of the scene's
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help_heading = IMAGE)]
     sampler: Option<String>,
-    /// How rays find shapes; the image is the same
-    #[arg(long, value_enum, default_value_t = Accel::Tree)]
-    accel: Accel,
     /// Render N spectral bands over 360-830 nm instead of RGB; the image's RGB is made from them
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=32))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=32), help_heading = IMAGE)]
     bands: Option<u8>,
-    /// Which way is up in a bare mesh
-    #[arg(long, value_enum, default_value_t = Up::Y)]
-    up: Up,
-    /// Refuse what Mitsuba 3 would not read
-    #[arg(long)]
-    strict: bool,
-    /// No progress bar, no summary
-    #[arg(short, long)]
+
+    /// Render frames START up to, and without, END; each defines $frame
+    #[arg(long, value_name = "START:END[:STEP]", value_parser = parse::frames, allow_hyphen_values = true, help_heading = SERIES)]
+    frames: Option<Frames>,
+    /// Let the camera go around the scene in N frames, all of them unless --frames says which
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000), help_heading = SERIES)]
+    turntable: Option<u32>,
+    /// Look through this sensor: its number from 0, its id, or "all" for one image each
+    #[arg(long, value_name = "N|ID|all", value_parser = |text: &str| Ok::<_, String>(Sensors::from(text)), help_heading = SERIES)]
+    sensor: Option<Sensors>,
+    /// Leave out images whose file is there, unless a checkpoint lies beside it
+    #[arg(long, help_heading = SERIES)]
+    skip_existing: bool,
+
+    /// Stop an image after so many seconds, and write what is complete
+    #[arg(long, value_name = "SECONDS", value_parser = parse::seconds, help_heading = RUN)]
+    time_limit: Option<Duration>,
+    /// Keep what is done in OUT.checkpoint, every so many seconds and when stopped
+    #[arg(long, value_name = "SECONDS", value_parser = parse::seconds, help_heading = RUN)]
+    checkpoint: Option<Duration>,
+    /// Go on from OUT.checkpoint where it is there; the image is the same as without interruption
+    #[arg(long, help_heading = RUN)]
+    resume: bool,
+    /// Refuse to take more memory, such as 8G; "none" for no limit. By default 90 % of what is free
+    #[arg(long, value_name = "SIZE", value_parser = parse::bytes, help_heading = RUN)]
+    memory_limit: Option<u64>,
+    /// Threads; one a processor by default. The image does not depend on it
+    #[arg(long, value_name = "N", help_heading = RUN)]
+    threads: Option<NonZeroUsize>,
+    /// How rays find shapes; the image is the same
+    #[arg(long, value_enum, default_value_t = Accel::Tree, help_heading = RUN)]
+    accel: Accel,
+
+    /// No progress bar, no summary, no warnings
+    #[arg(short, long, help_heading = TELL)]
     quiet: bool,
     /// Print a JSON object for each image: size, counts, seconds
-    #[arg(long)]
+    #[arg(long, help_heading = TELL)]
     json: bool,
     /// Print what was counted and timed
-    #[arg(long)]
+    #[arg(long, help_heading = TELL)]
     stats: bool,
 }
+
+const IMAGE: &str = "The image";
+const SERIES: &str = "Series of images";
+const RUN: &str = "The run";
+const TELL: &str = "What is told";
 
 const EXAMPLES: &str = "\
 Examples:
   etendue render scenes/cornell-box.xml -o cornell-box.png
   etendue render dragon.ply -o dragon.png --size 1920x1080 --spp 256
   etendue render a.xml b.xml -o out/{name}.exr --seed 7
-  etendue render scene.xml -o crop.exr --crop 100,80,64,64 --max-depth 2 -D spp=16";
+  etendue render scene.xml -o crop.exr --crop 100,80,64,64 --max-depth 2 -D spp=16
+  etendue render dragon.ply -o out/{frame:03}.png --turntable 36
+  etendue render walk.xml -o out/{frame:04}.exr --frames 0:240 -D body=body-{frame:04}.ply
+  etendue render big.xml -o big.exr --checkpoint 300 --resume";
 
 /// How rays find shapes.
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -95,178 +136,229 @@ enum Accel {
     Tree,
 }
 
-/// Which way is up.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum Up {
-    /// +y
-    Y,
-    /// +z
-    Z,
-}
-
-fn numbers<const N: usize>(text: &str, separator: char) -> Option<[u32; N]> {
-    let numbers: Vec<u32> = text
-        .split(separator)
-        .map(|t| t.trim().parse().ok())
-        .collect::<Option<_>>()?;
-    numbers.try_into().ok()
-}
-
-fn size(text: &str) -> std::result::Result<(u32, u32), String> {
-    let [width, height] = numbers(text, 'x').ok_or("write it as WIDTHxHEIGHT, such as 640x480")?;
-    Ok((width, height))
-}
-
-fn crop(text: &str) -> std::result::Result<Window, String> {
-    let [x, y, width, height] =
-        numbers(text, ',').ok_or("write it as X,Y,WIDTH,HEIGHT, such as 10,20,64,64")?;
-    Ok(Window {
-        x,
-        y,
-        width,
-        height,
-    })
-}
-
-fn define(text: &str) -> std::result::Result<(String, String), String> {
-    let (name, value) = text.split_once('=').ok_or("write it as name=value")?;
-    Ok((name.to_owned(), value.to_owned()))
-}
-
-/// Runs the command.
-pub(super) fn run(arguments: &Arguments) -> Result<()> {
-    let outputs = output::expand_all(&arguments.output, &arguments.inputs)?;
-    for path in &outputs {
-        image::check_writable(path)?;
-    }
-    for (input, path) in arguments.inputs.iter().zip(&outputs) {
-        render_one(arguments, input, path)?;
-    }
-    Ok(())
-}
-
-fn render_one(arguments: &Arguments, input: &Path, path: &Path) -> Result<()> {
-    let start = Instant::now();
-    let description = describe(arguments, input)?;
-    let bar = Bar::new(&input.display().to_string(), arguments.quiet);
-    let result = render::render(&description, &options(arguments, input), &bar);
-    bar.finish();
-    let rendered = result?;
-    if !arguments.quiet {
-        report::warnings(&rendered.warnings);
-    }
-    display::save_window(path, &rendered.image, &rendered.window, &rendered.metadata)?;
-    tell(arguments, input, path, &rendered, start.elapsed());
-    Ok(())
-}
-
-/// The scene, with the arguments' values in place of its own.
-fn describe(arguments: &Arguments, input: &Path) -> Result<Description> {
-    let options = description::Options {
-        defines: arguments.define.clone(),
-        strict: arguments.strict,
-    };
-    let mut description = if render::is_mesh(input) {
-        let up = match arguments.up {
-            Up::Y => UpAxis::Y,
-            Up::Z => UpAxis::Z,
+impl Arguments {
+    fn options(&self, item: &Item) -> Options {
+        let checkpoint = Checkpoint {
+            path: item.checkpoint(),
+            every: self.checkpoint,
+            resume: self.resume,
         };
-        render::describe_mesh(input, up, &options)?
-    } else if input
-        .extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("xml"))
-    {
-        Description::read(input, &options)?
-    } else {
-        let message = format!("{}: neither a scene nor a mesh", input.display());
-        return Err(Error::input(message).help("a scene is an .xml file, a mesh a .ply or .obj"));
-    };
-    let overrides = Overrides {
-        spp: arguments.spp,
-        sampler: arguments.sampler.clone(),
-        size: arguments.size,
-        crop: arguments.crop,
-        integrator: arguments.integrator.clone(),
-        max_depth: arguments.max_depth,
-    };
-    overrides.apply(&mut description);
-    Ok(description)
-}
-
-fn options(arguments: &Arguments, input: &Path) -> Options {
-    Options {
-        scene: input.display().to_string(),
-        seed: arguments.seed,
-        threads: arguments.threads,
-        colors: arguments
-            .bands
-            .map_or(Colors::Rgb, |n| Colors::Bands(n.into())),
-        method: match arguments.accel {
-            Accel::Brute => Method::Brute,
-            Accel::Tree => Method::Tree,
-        },
-    }
-}
-
-/// Says what was done, as the arguments ask.
-fn tell(arguments: &Arguments, input: &Path, path: &Path, rendered: &Rendered, total: Duration) {
-    let report = &rendered.report;
-    if arguments.json {
-        let mut object = serde_json::to_value(report).expect("a report has only names and numbers");
-        object["input"] = input.display().to_string().into();
-        object["output"] = path.display().to_string().into();
-        object["seconds"]["total"] = total.as_secs_f64().into();
-        output::line(&object.to_string());
-        return;
-    }
-    if !arguments.quiet {
-        let [width, height] = report.size;
-        output::line(&format!(
-            "{}: {width}×{height}, {} samples a pixel, {}",
-            path.display(),
-            report.spp,
-            human_duration(total)
-        ));
-    }
-    if arguments.stats {
-        let stats = &report.stats;
-        let rays = stats.rays().max(1) as f64;
-        let rate = rays / report.seconds.render.max(1e-9) * 1e-6;
-        for (name, value) in [
-            ("primitives", report.primitives.to_string()),
-            ("lights", report.lights.to_string()),
-            (
-                "geometry, trees",
-                format!(
-                    "{:.1} MB, {:.1} MB",
-                    megabytes(report.bytes[0]),
-                    megabytes(report.bytes[1])
-                ),
-            ),
-            ("camera rays", stats.camera_rays.to_string()),
-            ("bounce rays", stats.bounce_rays.to_string()),
-            ("shadow rays", stats.shadow_rays.to_string()),
-            ("points shaded", stats.shaded.to_string()),
-            (
-                "node steps a ray",
-                format!("{:.2}", stats.tracing.node_steps as f64 / rays),
-            ),
-            (
-                "primitive tests a ray",
-                format!("{:.2}", stats.tracing.primitive_tests as f64 / rays),
-            ),
-            ("seconds to load", format!("{:.3}", report.seconds.load)),
-            ("seconds to build", format!("{:.3}", report.seconds.build)),
-            (
-                "seconds to render",
-                format!("{:.3} ({rate:.2} M rays/s)", report.seconds.render),
-            ),
-        ] {
-            output::line(&format!("  {name:22} {value}"));
+        Options {
+            scene: item.input.display().to_string(),
+            seed: self.seed,
+            threads: self.threads,
+            colors: self.bands.map_or(Colors::Rgb, |n| Colors::Bands(n.into())),
+            method: match self.accel {
+                Accel::Brute => Method::Brute,
+                Accel::Tree => Method::Tree,
+            },
+            sensor: item.sensor,
+            checkpoint: (self.checkpoint.is_some() || self.resume).then_some(checkpoint),
+            memory_limit: self.memory_limit,
         }
     }
+
+    fn overrides(&self) -> Overrides {
+        Overrides {
+            spp: self.spp,
+            sampler: self.sampler.clone(),
+            size: self.size,
+            crop: self.crop,
+            integrator: self.integrator.clone(),
+            max_depth: self.max_depth,
+        }
+    }
+
+    fn style(&self) -> Style {
+        Style {
+            quiet: self.quiet,
+            json: self.json,
+            stats: self.stats,
+        }
+    }
+
+    fn skips(&self, item: &Item) -> bool {
+        self.skip_existing && item.output.exists() && !item.checkpoint().exists()
+    }
+
+    fn batch(&self) -> Result<Batch> {
+        let request = Request {
+            inputs: &self.inputs,
+            frames: self.frames.or(self.turntable.map(Frames::first)),
+            sensors: self.sensor.as_ref(),
+            output: &self.output,
+            scene: &self.scene,
+        };
+        request.batch()
+    }
 }
 
-fn megabytes(bytes: usize) -> f64 {
-    bytes as f64 * 1e-6
+/// Runs the command; the answer is the exit status.
+pub(super) fn run(arguments: &Arguments) -> Result<u8> {
+    let stop = Stop::on_signals()?;
+    let Batch { items, failed } = arguments.batch()?;
+    output::check_distinct(items.iter().map(|i| (i.output.as_path(), i.name())))?;
+    let wanted = items.iter().filter(|item| !arguments.skips(item));
+    output::check_writable(wanted.map(|item| item.output.as_path()))?;
+    let mut series = Series {
+        arguments,
+        session: Session::default(),
+        read: None,
+        told: Vec::new(),
+        stop,
+    };
+    let style = arguments.style();
+    let mut endings = Vec::new();
+    for (input, error) in failed {
+        report::error(&error);
+        endings.push((input.display().to_string(), Ending::Failed(error)));
+    }
+    for item in &items {
+        let begin = Instant::now();
+        let ending = if series.stop.signalled() {
+            Ending::NotBegun
+        } else if arguments.skips(item) {
+            Ending::Skipped
+        } else {
+            series.item(item).unwrap_or_else(|error| {
+                report::error(&error);
+                Ending::Failed(error)
+            })
+        };
+        summary::tell(style, item, &ending, begin.elapsed());
+        endings.push((item.output.display().to_string(), ending));
+    }
+    if endings.len() > 1 {
+        summary::table(style, &endings);
+    }
+    let signalled = series.stop.signalled();
+    Ok(summary::status(&endings, signalled))
+}
+
+/// Images, one after another.
+struct Series<'a> {
+    arguments: &'a Arguments,
+    session: Session,
+    /// The input that was read last, and how: frames of a mesh need it but once.
+    read: Option<(PathBuf, description::Options, Description)>,
+    /// Warnings that were told already.
+    told: Vec<Problem>,
+    stop: Stop,
+}
+
+impl Series<'_> {
+    fn item(&mut self, item: &Item) -> Result<Ending> {
+        let arguments = self.arguments;
+        let deadline = arguments.time_limit.map(|limit| Instant::now() + limit);
+        let stop = self.stop.by(deadline);
+        let mut options = arguments.options(item);
+        if options.memory_limit.is_none() {
+            options.memory_limit = memory::available().map(|free| free / 10 * 9);
+        }
+        if arguments.checkpoint.is_some() && !arguments.resume && item.checkpoint().exists() {
+            let path = item.checkpoint();
+            self.warn(&Error::input(format!(
+                "{} is overwritten; --resume would go on from it",
+                path.display()
+            )));
+        }
+        let read = self.read(item)?;
+        let bar = Bar::new(&item.name(), arguments.quiet, stop);
+        let rendered = self.look(item, read, &options, &bar);
+        bar.finish();
+        let rendered = rendered?;
+        self.finish(item, &options, rendered)
+    }
+
+    /// Renders the description, from where the turntable has turned the camera, and keeps it.
+    fn look(
+        &mut self,
+        item: &Item,
+        (as_read, mut description): (description::Options, Description),
+        options: &Options,
+        bar: &Bar,
+    ) -> Result<Rendered> {
+        let sensor = sensors(&description).get(item.sensor).copied();
+        let turned = self.arguments.turntable.zip(item.frame).zip(sensor);
+        if let Some(((count, frame), sensor)) = turned {
+            let bounds = self.session.bounds(&description, options, bar)?;
+            let pose = description.get(sensor, "to_world").cloned();
+            let turns = frame as f64 / f64::from(count);
+            turn(&mut description, sensor, &bounds, turns);
+            let rendered = self.session.render(&description, options, bar);
+            let pose = pose.unwrap_or(Value::Transform(DMat4::IDENTITY));
+            description.set(sensor, "to_world", pose);
+            self.read = Some((item.input.clone(), as_read, description));
+            return rendered;
+        }
+        let rendered = self.session.render(&description, options, bar);
+        self.read = Some((item.input.clone(), as_read, description));
+        rendered
+    }
+
+    /// The description of an item, with the arguments' values in place of its own.
+    fn read(&mut self, item: &Item) -> Result<(description::Options, Description)> {
+        let scene = &self.arguments.scene;
+        // A bare mesh has no parameters, and reading it takes time.
+        let bare = etendue::render::is_mesh(&item.input);
+        let options = scene.options(item.frame.filter(|_| !bare));
+        if let Some((input, as_read, description)) = self.read.take()
+            && input == item.input
+            && as_read == options
+        {
+            return Ok((options, description));
+        }
+        let mut description = scene.describe(&item.input, &options)?;
+        self.arguments.overrides().apply(&mut description);
+        Ok((options, description))
+    }
+
+    /// Writes the image and says what it is.
+    fn finish(&mut self, item: &Item, options: &Options, rendered: Rendered) -> Result<Ending> {
+        for problem in &rendered.warnings {
+            self.warn_of(problem);
+        }
+        let completed = rendered.report.completed;
+        if completed.units[0] == 0 && !completed.is_whole() {
+            if self.stop.signalled() {
+                return Ok(Ending::NotBegun);
+            }
+            let message = format!("{}: no tile was complete in time", item.name());
+            return Err(Error::input(message).help("give a longer --time-limit"));
+        }
+        let Rendered {
+            image,
+            window,
+            metadata,
+            report,
+            ..
+        } = rendered;
+        display::save_window(&item.output, &image, &window, &metadata)?;
+        if completed.is_whole() {
+            if let Some(checkpoint) = &options.checkpoint {
+                checkpoint.remove();
+            }
+            return Ok(Ending::Rendered(report));
+        }
+        self.warn(&summary::incomplete(item, &report));
+        Ok(if self.stop.signalled() {
+            Ending::Interrupted(report)
+        } else {
+            Ending::TimeLimit(report)
+        })
+    }
+
+    fn warn(&mut self, error: &Error) {
+        for problem in error.problems() {
+            self.warn_of(problem);
+        }
+    }
+
+    /// Says a warning once in a series.
+    fn warn_of(&mut self, problem: &Problem) {
+        if !self.arguments.quiet && !self.told.contains(problem) {
+            report::warnings(std::slice::from_ref(problem));
+            self.told.push(problem.clone());
+        }
+    }
 }

@@ -6,7 +6,7 @@ use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
-use etendue::error::{Error, Location, Problem};
+use etendue::error::{Error, Kind, Location, Problem};
 
 /// The longest line and the largest file that are shown.
 const MAX_LINE: usize = 400;
@@ -20,6 +20,33 @@ pub(super) fn error(error: &Error) {
 /// Prints warnings.
 pub(super) fn warnings(problems: &[Problem]) {
     print(problems, Level::WARNING);
+}
+
+/// Problems for programs: an array of objects.
+pub(super) fn json(problems: &[Problem]) -> serde_json::Value {
+    let place = |location: &Location| {
+        serde_json::json!({
+            "file": location.file.display().to_string(),
+            "line": location.line,
+            "column": location.column,
+        })
+    };
+    let object = |problem: &Problem| {
+        serde_json::json!({
+            "kind": match problem.kind {
+                Kind::Input => "input",
+                Kind::Unsupported => "unsupported",
+                Kind::System => "system",
+            },
+            "message": problem.message,
+            "location": problem.location.as_ref().map(place),
+            "help": problem.help,
+            "related": problem.related.as_ref().map(|(location, what)| {
+                serde_json::json!({ "what": what, "location": place(location) })
+            }),
+        })
+    };
+    problems.iter().map(object).collect()
 }
 
 fn print(problems: &[Problem], level: Level<'static>) {

@@ -29,17 +29,22 @@ struct Define {
 }
 
 impl Defines {
-    pub(super) fn new(given: &[(String, String)]) -> Self {
-        let values = given.iter().map(|(name, value)| {
-            let define = Define {
-                value: value.clone(),
-                given: true,
-                used: false,
-            };
-            (name.clone(), define)
-        });
+    /// What the command line gives, which somebody must use, and what it offers, which nobody need.
+    pub(super) fn new(given: &[(String, String)], offers: &[(String, String)]) -> Self {
+        let define = |given: bool| {
+            move |(name, value): &(String, String)| {
+                let value = value.clone();
+                let define = Define {
+                    value,
+                    given,
+                    used: false,
+                };
+                (name.clone(), define)
+            }
+        };
+        let offers = offers.iter().map(define(false));
         Self {
-            values: values.collect(),
+            values: offers.chain(given.iter().map(define(true))).collect(),
             ..Self::default()
         }
     }
@@ -167,7 +172,7 @@ mod tests {
             .iter()
             .map(|n| ((*n).to_owned(), format!("<{n}>")))
             .collect();
-        Defines::new(&given)
+        Defines::new(&given, &[])
     }
 
     #[test]
@@ -198,6 +203,18 @@ mod tests {
         let message = report.finish().unwrap_err().to_string();
         assert!(message.contains("no parameter $ssp"), "{message}");
         assert!(message.contains("did you mean \"spp\"?"), "{message}");
+    }
+
+    #[test]
+    fn an_offer_comes_before_a_default_and_after_what_is_given_and_need_not_be_used() {
+        let pair = |name: &str, value: &str| (name.to_owned(), value.to_owned());
+        let offers = [pair("frame", "7"), pair("spp", "1"), pair("unused", "")];
+        let mut d = Defines::new(&[pair("spp", "64")], &offers);
+        d.set_default("frame", "0");
+        assert_eq!(d.substitute("$frame $spp").unwrap(), "7 64");
+        let mut report = Report::default();
+        d.report_unused(&mut report);
+        assert!(report.is_empty());
     }
 
     #[test]

@@ -5,6 +5,7 @@
 
 pub mod properties;
 
+mod canonical;
 mod defines;
 mod element;
 mod overrides;
@@ -27,6 +28,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use glam::{DMat4, DVec3};
 
+pub use self::canonical::{Canonical, Part};
 pub use self::properties::Properties;
 use self::reader::Reader;
 use self::resolve::Scopes;
@@ -209,10 +211,12 @@ impl Node {
 }
 
 /// How a scene file is to be read.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Options {
     /// Values for the file's `$name` parameters, as `-D name=value` gives them; a later one wins.
     pub defines: Vec<(String, String)>,
+    /// Values for parameters that the file may have or not, such as the number of a frame; `defines` come first.
+    pub offers: Vec<(String, String)>,
     /// Whether what Mitsuba 3 does not read (keyframes, `#rrggbb`, `<lookAt>`) is an error.
     pub strict: bool,
 }

@@ -25,10 +25,27 @@ impl Description {
         }
     }
 
+    /// The nested plugins of a kind, in file order. Nothing counts as read by it.
+    pub fn children_of(&self, parent: NodeId, kind: Kind) -> Vec<NodeId> {
+        let nested = |property: &Property| match property.value {
+            Value::Object(id) if self.nodes[id.index()].kind == kind => Some(id),
+            _ => None,
+        };
+        let properties = &self.nodes[parent.index()].properties;
+        properties.iter().filter_map(nested).collect()
+    }
+
+    /// What a node's property holds. It does not count as read by it.
+    pub fn get(&self, id: NodeId, name: &str) -> Option<&Value> {
+        let properties = &self.nodes[id.index()].properties;
+        let property = properties.iter().find(|p| p.name == name);
+        property.map(|p| &p.value)
+    }
+
     /// The first nested plugin of a kind, which is added as `plugin` where there is none.
     pub fn child_or_new(&mut self, parent: NodeId, kind: Kind, plugin: &str) -> NodeId {
-        if let Some(child) = self.node(parent).children(kind).first() {
-            return child.node_id();
+        if let Some(child) = self.children_of(parent, kind).first() {
+            return *child;
         }
         let id = NodeId(self.nodes.len() as u32);
         self.nodes.push(Node::new(kind, plugin, command_line()));

@@ -3,7 +3,7 @@
 //! sampling. Equal to `path` at `max_depth` 2 in the mean.
 
 use super::mis::power;
-use super::{Estimate, Estimator, FIRST_DIMENSION, Start, Stats};
+use super::{Estimate, Estimates, Estimator, FIRST_DIMENSION, Start, Stats};
 use crate::color::{ColorModel, Spectral};
 use crate::description::Properties;
 use crate::error::Result;
@@ -87,9 +87,10 @@ impl<C: ColorModel> Estimator<C> for Direct {
         scene: &Scene<C>,
         sampler: &Sampler,
         starts: &[Start<C>],
-        estimates: &mut Vec<Estimate<C::Sample>>,
+        estimates: &mut Estimates<C::Sample>,
         stats: &mut Stats,
     ) {
+        let estimates = &mut estimates.values;
         estimates.clear();
         let (light_share, bsdf_share) = (
             self.share(self.emitter_samples),

@@ -4,6 +4,8 @@
 //! rays traced. Contributions reach a path's slot in a fixed order (emission, then light samples, bounce
 //! by bounce), so that the sum's bits do not depend on the batch.
 
+mod aov;
+mod depth;
 mod direct;
 mod mis;
 mod moment;
@@ -36,8 +38,17 @@ pub struct Estimate<S> {
     pub alpha: f32,
 }
 
+/// What the starts of a batch came to.
+#[derive(Clone, Debug, Default)]
+pub struct Estimates<S> {
+    /// One a start.
+    pub values: Vec<Estimate<S>>,
+    /// For each start the values of [`Estimator::extra_channels`].
+    pub extra: Vec<f32>,
+}
+
 /// What light transport costs, counted.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Stats {
     /// Rays from the camera.
     pub camera_rays: u64,
@@ -69,13 +80,18 @@ impl Stats {
 
 /// What every integrator does.
 pub trait Estimator<C: ColorModel>: std::fmt::Debug + Send + Sync {
-    /// Estimates the radiance of each start, in the order of the starts.
+    /// Names of the values that it estimates beside radiance and opacity.
+    fn extra_channels(&self) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// Estimates each start, in the order of the starts, in place of what `estimates` held.
     fn estimate(
         &self,
         scene: &Scene<C>,
         sampler: &Sampler,
         starts: &[Start<C>],
-        estimates: &mut Vec<Estimate<C::Sample>>,
+        estimates: &mut Estimates<C::Sample>,
         stats: &mut Stats,
     );
 }
@@ -84,6 +100,8 @@ family! {
     /// Every integrator there is.
     #[derive(Debug)]
     pub enum Integrator<C>: Estimator, kind "integrator", context () {
+        "aov" => Aov(aov::Aov<C>),
+        "depth" => Depth(depth::Depth),
         "direct" => Direct(direct::Direct),
         "moment" => Moment(moment::Moment<C>),
         "path" => Path(path::Path),
@@ -101,12 +119,16 @@ impl<C: ColorModel> Default for Integrator<C> {
 pub const FIRST_DIMENSION: u32 = 6;
 
 impl<C: ColorModel> Estimator<C> for Integrator<C> {
+    fn extra_channels(&self) -> Vec<String> {
+        (**self).extra_channels()
+    }
+
     fn estimate(
         &self,
         scene: &Scene<C>,
         sampler: &Sampler,
         starts: &[Start<C>],
-        estimates: &mut Vec<Estimate<C::Sample>>,
+        estimates: &mut Estimates<C::Sample>,
         stats: &mut Stats,
     ) {
         (**self).estimate(scene, sampler, starts, estimates, stats);

@@ -1,7 +1,7 @@
 //! `moment`: renders its nested integrator. (Mitsuba's also writes the samples' squares; its scenes use
 //! it for their references, and the image is the nested one's.)
 
-use super::{Estimate, Estimator, Integrator, Start, Stats};
+use super::{Estimates, Estimator, Integrator, Start, Stats};
 use crate::color::ColorModel;
 use crate::description::{Kind, Properties};
 use crate::error::Result;
@@ -32,12 +32,16 @@ impl<C: ColorModel> Moment<C> {
 }
 
 impl<C: ColorModel> Estimator<C> for Moment<C> {
+    fn extra_channels(&self) -> Vec<String> {
+        self.nested.extra_channels()
+    }
+
     fn estimate(
         &self,
         scene: &Scene<C>,
         sampler: &Sampler,
         starts: &[Start<C>],
-        estimates: &mut Vec<Estimate<C::Sample>>,
+        estimates: &mut Estimates<C::Sample>,
         stats: &mut Stats,
     ) {
         self.nested

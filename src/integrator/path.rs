@@ -5,7 +5,7 @@
 //! Roulette starts at `rr_depth` (5) and lets a path live with probability min(max(throughput)·η², 0.95).
 
 use super::mis::power;
-use super::{Estimate, Estimator, FIRST_DIMENSION, Start, Stats};
+use super::{Estimate, Estimates, Estimator, FIRST_DIMENSION, Start, Stats};
 use crate::color::{ColorModel, Spectral};
 use crate::description::Properties;
 use crate::error::Result;
@@ -190,9 +190,10 @@ impl<C: ColorModel> Estimator<C> for Path {
         scene: &Scene<C>,
         sampler: &Sampler,
         starts: &[Start<C>],
-        estimates: &mut Vec<Estimate<C::Sample>>,
+        estimates: &mut Estimates<C::Sample>,
         stats: &mut Stats,
     ) {
+        let estimates = &mut estimates.values;
         estimates.clear();
         estimates.resize(
             starts.len(),

@@ -4,12 +4,11 @@ use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
 
-use super::{Emitter, LightContext, LightSample};
+use super::{Emitter, LightContext, LightSample, texture_point};
 use crate::color::{Color, ColorModel, Role, Spectral};
 use crate::description::Properties;
 use crate::error::Result;
 use crate::interaction::Interaction;
-use crate::math::Frame;
 use crate::shape::{Geometry, SurfaceSample};
 use crate::texture::{Palettes, Texture};
 
@@ -81,25 +80,5 @@ impl<C: ColorModel> Emitter<C> for Area<C> {
 
     fn surface_pdf(&self, from: Vec3, at: &Interaction<'_>) -> f32 {
         self.shape.pdf(from, at)
-    }
-}
-
-/// A point of the light as its texture sees it.
-fn texture_point(position: Vec3, normal: Vec3, uv: Vec2) -> Interaction<'static> {
-    Interaction {
-        t: 0.0,
-        position,
-        error: Vec3::ZERO,
-        normal,
-        frame: Frame::around(normal),
-        uv,
-        dp_du: Vec3::ZERO,
-        dp_dv: Vec3::ZERO,
-        wi: Vec3::Z,
-        time: 0.0,
-        shape: 0,
-        primitive: 0,
-        mesh: None,
-        barycentric: Vec2::ZERO,
     }
 }

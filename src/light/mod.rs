@@ -3,18 +3,21 @@
 mod area;
 mod constant;
 mod directional;
+mod envmap;
 mod point;
+mod projector;
+mod spot;
 
 use std::sync::Arc;
 
-use glam::{DMat4, Vec2, Vec3};
+use glam::{DMat4, Mat3, Vec2, Vec3};
 
 use crate::color::{ColorModel, Spectral};
 use crate::description::Properties;
 use crate::error::Result;
 use crate::family::family;
 use crate::interaction::Interaction;
-use crate::math::Transform;
+use crate::math::{Frame, Transform};
 use crate::shape::Geometry;
 use crate::texture::Palettes;
 
@@ -82,7 +85,10 @@ family! {
         "area" => Area(area::Area<C>),
         "constant" => Constant(constant::Constant<C>),
         "directional" => Directional(directional::Directional<C>),
+        "envmap" => Envmap(envmap::Envmap<C>),
         "point" => Point(point::Point<C>),
+        "projector" => Projector(projector::Projector<C>),
+        "spot" => Spot(spot::Spot<C>),
     }
 }
 
@@ -92,3 +98,41 @@ fn to_world(properties: &Properties<'_>) -> Result<Transform> {
     Transform::new(&matrix)
         .ok_or_else(|| properties.error("to_world", "the transform must be affine and invertible"))
 }
+
+/// The property `to_world` of a light that is infinitely far: a rotation, maybe mirrored.
+fn rotation(properties: &Properties<'_>) -> Result<Mat3> {
+    let m = to_world(properties)?.linear();
+    let scale = m.x_axis.length();
+    let rotation = m * scale.recip();
+    let product = rotation.transpose() * rotation;
+    if product.abs_diff_eq(Mat3::IDENTITY, 1e-4) {
+        Ok(rotation)
+    } else {
+        Err(properties
+            .error("to_world", "an environment cannot be stretched or sheared")
+            .help("leave a rotation"))
+    }
+}
+
+/// A point of a light as its texture sees it.
+fn texture_point(position: Vec3, normal: Vec3, uv: Vec2) -> Interaction<'static> {
+    Interaction {
+        t: 0.0,
+        position,
+        error: Vec3::ZERO,
+        normal,
+        frame: Frame::around(normal),
+        uv,
+        dp_du: Vec3::ZERO,
+        dp_dv: Vec3::ZERO,
+        wi: Vec3::Z,
+        time: 0.0,
+        shape: 0,
+        primitive: 0,
+        mesh: None,
+        barycentric: Vec2::ZERO,
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -123,6 +123,12 @@ pub trait Bsdf<C: ColorModel>: std::fmt::Debug + Send + Sync {
         wavelengths: &C::Wavelengths,
     ) -> Option<BsdfValue<C::Sample>>;
 
+    /// The diffuse reflectance, for the channel that shows it: π·f seen and lit along the normal.
+    fn albedo(&self, at: &Interaction<'_>, wavelengths: &C::Wavelengths) -> C::Sample {
+        let straight = self.eval(at, Vec3::Z, Vec3::Z, wavelengths);
+        straight.map_or(C::Sample::zero(), |v| v.value * std::f32::consts::PI)
+    }
+
     /// Draws `wo`: `u1` chooses the lobe, `u2` the direction.
     fn sample(
         &self,

@@ -30,15 +30,17 @@ impl Frame {
     /// The frame around the unit vector `n` whose s points along `tangent` as far as it can; any frame
     /// where `tangent` is parallel to `n`, zero or not finite.
     pub fn along(n: Vec3, tangent: Vec3) -> Self {
-        let s = (tangent - n * n.dot(tangent)).normalize_or_zero();
-        if s == Vec3::ZERO || !s.is_finite() {
-            Self::around(n)
-        } else {
+        let across = tangent - n * n.dot(tangent);
+        // What is left of a tangent along n is rounding error, in no particular direction.
+        if across.length_squared() > 1e-8 * tangent.length_squared() && across.is_finite() {
+            let s = across.normalize();
             Self {
                 s,
                 t: n.cross(s),
                 n,
             }
+        } else {
+            Self::around(n)
         }
     }
 

@@ -89,11 +89,11 @@ fn scene(plugin: &str, path: &Path, (min, max): (Vec3, Vec3), up: Vec3) -> Strin
         <film type="hdrfilm"><integer name="width" value="1024"/><integer name="height" value="768"/></film>
         <sampler type="stratified"><integer name="sample_count" value="64"/></sampler>
     </sensor>
-    <emitter type="constant"><rgb name="radiance" value="0.55, 0.6, 0.7"/></emitter>
+    <emitter type="constant"><rgb name="radiance" value="0.42, 0.47, 0.55"/></emitter>
     <shape type="sphere">
         <point name="center" value="{key}"/>
         <float name="radius" value="{key_radius}"/>
-        <emitter type="area"><rgb name="radiance" value="55, 50, 43"/></emitter>
+        <emitter type="area"><rgb name="radiance" value="30, 27, 23"/></emitter>
     </shape>
     <shape type="rectangle">
         <transform name="to_world">

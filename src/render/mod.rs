@@ -2,27 +2,35 @@
 //! tiles and the samples into passes, and (tile, pass) units are rendered in parallel and summed in a
 //! fixed order, so that one seed gives one image.
 
-mod bare;
 mod options;
-mod prepare;
 mod progress;
+
+mod bare;
+mod checkpoint;
+mod fingerprint;
+mod memory;
+mod plan;
+mod prepare;
+mod session;
 mod sums;
 mod unit;
 
-use std::num::NonZeroUsize;
 use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
-use crate::color::{Bands, ColorModel, Rgb};
 use crate::description::Description;
-use crate::error::{Error, Problem, Result};
+use crate::error::{Problem, Result};
 use crate::image::{Image, Metadata, Window};
 use crate::integrator::Stats;
 
 pub use bare::{UpAxis, describe_mesh, is_mesh};
+pub use checkpoint::Checkpoint;
+pub use memory::human_bytes;
 pub use options::{Colors, Options, Overrides};
+pub use plan::Completed;
 pub use progress::{Phase, Progress, Silent};
+pub use session::Session;
 
 /// A rendered image and how it came about.
 #[derive(Debug)]
@@ -46,6 +54,8 @@ pub struct Report {
     pub size: [u32; 2],
     /// Samples a pixel.
     pub spp: u32,
+    /// How much of it is done: all, unless the render was stopped.
+    pub completed: Completed,
     /// Seed of the random numbers.
     pub seed: u64,
     /// Threads used.
@@ -62,7 +72,7 @@ pub struct Report {
     pub dropped_samples: u64,
     /// One of their pixels.
     pub dropped_pixel: Option<[u32; 2]>,
-    /// Seconds by phase.
+    /// Seconds by phase. What a session had in memory took none, and a resumed render all of its runs.
     pub seconds: Seconds,
 }
 
@@ -77,68 +87,16 @@ pub struct Seconds {
     pub render: f64,
 }
 
-/// Renders what `description` says. `description` has the options' overrides already: see
-/// [`Overrides::apply`].
+/// Renders a single image: see [`Session::render`].
 ///
 /// # Errors
-/// Names everything that is wrong with the scene, unread properties included.
+/// As [`Session::render`].
 pub fn render(
     description: &Description,
     options: &Options,
     progress: &dyn Progress,
 ) -> Result<Rendered> {
-    let threads = options.threads.map_or(0, NonZeroUsize::get);
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .build()
-        .map_err(|e| Error::input(format!("cannot start {threads} threads: {e}")))?;
-    pool.install(|| match options.colors {
-        Colors::Rgb => render_as(description, options, Rgb, progress),
-        Colors::Bands(n @ 1..=8) => render_bands::<8>(n, description, options, progress),
-        Colors::Bands(n @ 9..=16) => render_bands::<16>(n, description, options, progress),
-        Colors::Bands(n) => render_bands::<32>(n, description, options, progress),
-    })
-}
-
-fn render_bands<const N: usize>(
-    count: usize,
-    description: &Description,
-    options: &Options,
-    progress: &dyn Progress,
-) -> Result<Rendered> {
-    let bands = Bands::<N>::new(count)
-        .ok_or_else(|| Error::input(format!("{count} bands; 1 to 32 are possible")))?;
-    render_as(description, options, bands, progress)
-}
-
-fn render_as<C: ColorModel>(
-    description: &Description,
-    options: &Options,
-    color: C,
-    progress: &dyn Progress,
-) -> Result<Rendered> {
-    let mut seconds = Seconds::default();
-    let assets = timed(&mut seconds.load, || prepare::load(description, progress))?;
-    let job = timed(&mut seconds.build, || {
-        prepare::prepare(description, &assets, options, color, progress)
-    })?;
-    let sums = timed(&mut seconds.render, || {
-        unit::run(&job, options.seed, progress)
-    });
-    let mut report = job.report(options, &assets);
-    report.seconds = seconds;
-    report.stats = sums.stats;
-    report.dropped_samples = sums.dropped;
-    report.dropped_pixel = sums.dropped_pixel;
-    let mut warnings = job.warnings.clone();
-    warnings.extend(sums.warning());
-    Ok(Rendered {
-        image: sums.develop(&job.film)?,
-        window: job.window(),
-        metadata: job.metadata(&report),
-        report,
-        warnings,
-    })
+    Session::default().render(description, options, progress)
 }
 
 fn timed<T>(seconds: &mut f64, work: impl FnOnce() -> T) -> T {

@@ -2,6 +2,7 @@
 
 use std::num::NonZeroUsize;
 
+use super::checkpoint::Checkpoint;
 use crate::accel::Method;
 use crate::description::{Description, Kind, NodeId, Value};
 use crate::sensor::Window;
@@ -29,6 +30,12 @@ pub struct Options {
     pub colors: Colors,
     /// Tree or brute force.
     pub method: Method,
+    /// Which of the scene's sensors, in file order from 0.
+    pub sensor: usize,
+    /// Where the render is kept, so that it can be continued after an interruption.
+    pub checkpoint: Option<Checkpoint>,
+    /// The most bytes that the render may take, by an estimate made before they are taken.
+    pub memory_limit: Option<u64>,
 }
 
 /// Values in place of the scene's own.
@@ -60,13 +67,7 @@ impl Overrides {
             let innermost = innermost(description, integrator);
             description.set(innermost, "max_depth", Value::Integer(depth));
         }
-        let sensors: Vec<NodeId> = description
-            .root()
-            .children(Kind::Sensor)
-            .iter()
-            .map(|s| s.node_id())
-            .collect();
-        for sensor in sensors {
+        for sensor in description.children_of(root, Kind::Sensor) {
             self.apply_to_sensor(description, sensor);
         }
     }
@@ -98,11 +99,10 @@ impl Overrides {
 /// The integrator inside a wrapper such as `moment`.
 fn innermost(description: &Description, mut integrator: NodeId) -> NodeId {
     while let Some(child) = description
-        .node(integrator)
-        .children(Kind::Integrator)
+        .children_of(integrator, Kind::Integrator)
         .first()
     {
-        integrator = child.node_id();
+        integrator = *child;
     }
     integrator
 }

@@ -1,125 +1,262 @@
 //! From a description to a job: the scene, and what it is looked at with. What is wrong is gathered over
-//! all parts; properties that nobody read come last, for by then everybody has read.
+//! all parts; properties that nobody read come last, for by then everybody has read. The scene is kept for
+//! the next render, which may be of another view or frame.
 
+use std::any::Any;
+
+use super::fingerprint::{self, Fingerprint};
+use super::memory::{self, Estimate};
+use super::options::{Colors, Options};
+use super::plan::Completed;
 use super::progress::{Phase, Progress};
-use super::{Options, Report, Seconds};
+use super::{Report, Seconds, timed};
+use crate::accel::Method;
 use crate::color::ColorModel;
-use crate::description::{Description, Kind, Properties};
+use crate::description::{Description, Kind, NodeId, Properties};
 use crate::error::{Error, Problem, Problems, Result};
 use crate::image::{Metadata, Window};
-use crate::integrator::{Integrator, Stats};
+use crate::integrator::{Estimator, Integrator};
 use crate::sampler::Sampler;
 use crate::scene::{self, Assets, Scene};
 use crate::sensor::{Film, Sensor};
+use crate::shape::Bounds;
 
-/// Everything that a render needs.
+/// A scene in memory, and what it was made from.
 #[derive(Debug)]
-pub(super) struct Job<C: ColorModel> {
-    pub(super) scene: Scene<C>,
+pub(super) struct Kept {
+    key: Key,
+    /// A `Scene<C>`, where the key's colours say which `C`.
+    scene: Box<dyn Any + Send>,
+    facts: Facts,
+}
+
+/// What two renders must agree in to share a scene.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Key {
+    scene: String,
+    colors: Colors,
+    method: Method,
+}
+
+/// What is known of a scene beside the scene.
+#[derive(Clone, Debug)]
+pub(super) struct Facts {
+    pub(super) primitives: u64,
+    pub(super) bounds: Bounds,
+    /// Bytes of geometry and of trees.
+    pub(super) bytes: [usize; 2],
+    warnings: Vec<Problem>,
+}
+
+/// What a scene is looked at with.
+#[derive(Debug)]
+pub(super) struct View<C: ColorModel> {
     pub(super) sensor: Sensor,
     pub(super) film: Film,
     pub(super) sampler: Sampler,
     pub(super) integrator: Integrator<C>,
-    pub(super) warnings: Vec<Problem>,
     /// The plugin's name, for the metadata.
     integrator_name: String,
-    scene_name: String,
 }
 
-/// Loads the shapes.
-pub(super) fn load(description: &Description, progress: &dyn Progress) -> Result<Assets> {
-    progress.begin(
-        Phase::Load,
-        description.root().children(Kind::Shape).len() as u64,
-    );
-    Assets::load(description, &|| progress.advance(1, 0))
+/// Everything that a render needs.
+#[derive(Debug)]
+pub(super) struct Job<'k, C: ColorModel> {
+    pub(super) scene: &'k Scene<C>,
+    pub(super) facts: &'k Facts,
+    pub(super) view: View<C>,
+    pub(super) seed: u64,
+    pub(super) warnings: Vec<Problem>,
 }
 
-/// What stands in a sensor.
-struct View {
-    sensor: Sensor,
-    film: Film,
-    sampler: Sampler,
-}
-
-fn view(properties: &Properties<'_>) -> Result<View> {
-    let film = match properties.children(Kind::Film).first() {
-        Some(film) => Film::build(film)?,
-        None => Film::default(),
-    };
-    let Some(sampler) = properties.children(Kind::Sampler).first().copied() else {
-        return Err(properties.error("", "the sensor has no sampler"));
-    };
-    let sampler = Sampler::build(&sampler, &())?;
-    Ok(View {
-        sensor: Sensor::build(properties, &film)?,
-        film,
-        sampler,
+/// The sensor that the options choose.
+pub(super) fn sensor(description: &Description, options: &Options) -> Result<NodeId> {
+    let root = description.root();
+    let sensors = root.children(Kind::Sensor);
+    let chosen = sensors.get(options.sensor).map(Properties::node_id);
+    chosen.ok_or_else(|| {
+        let message = match sensors.len() {
+            0 => "the scene has no sensor".to_owned(),
+            n => format!(
+                "the scene has no sensor {}; they are numbered from 0 to {}",
+                options.sensor,
+                n - 1
+            ),
+        };
+        let error = Error::input(message).at(root.location());
+        error.help("add a <sensor> to see it through")
     })
 }
 
-/// Builds the job.
-pub(super) fn prepare<C: ColorModel>(
-    description: &Description,
-    assets: &Assets,
-    options: &Options,
-    color: C,
-    progress: &dyn Progress,
-) -> Result<Job<C>> {
-    progress.begin(Phase::Build, 1);
-    let root = description.root();
+/// A sensor with what stands in it, and the integrator.
+pub(super) fn view<C: ColorModel>(description: &Description, sensor: NodeId) -> Result<View<C>> {
     let mut problems = Problems::default();
-    let view = match root.children(Kind::Sensor).first() {
-        Some(sensor) => problems.take(view(sensor)),
+    let properties = description.node(sensor);
+    let film = match properties.children(Kind::Film).first() {
+        Some(film) => problems.take(Film::build(film)),
+        None => Some(Film::default()),
+    };
+    let sensor = film
+        .as_ref()
+        .and_then(|film| problems.take(Sensor::build(&properties, film)));
+    let sampler = match properties.children(Kind::Sampler).first() {
+        Some(sampler) => problems.take(Sampler::build(sampler, &())),
         None => {
-            problems.push(
-                Error::input("the scene has no sensor")
-                    .at(root.location())
-                    .help("add a <sensor> to see it through"),
-            );
+            problems.push(properties.error("", "the sensor has no sampler"));
             None
         }
     };
-    let (integrator, integrator_name) = match root.children(Kind::Integrator).first() {
+    let (integrator, integrator_name) = match description.root().children(Kind::Integrator).first()
+    {
         Some(child) => (
             problems.take(Integrator::build(child, &())),
             child.plugin().to_owned(),
         ),
         None => (Some(Integrator::default()), "path".to_owned()),
     };
-    let scene = problems.take(scene::build(description, assets, color, options.method));
-    let (
-        Some(View {
-            sensor,
-            film,
-            sampler,
-        }),
-        Some(integrator),
-        Some(scene),
-    ) = (view, integrator, scene)
-    else {
-        problems.finish()?;
-        unreachable!("a part is missing, so there is a problem");
-    };
-    problems.extend(description.unread());
     problems.finish()?;
-    progress.advance(1, 0);
-    let mut warnings = description.warnings().to_vec();
-    warnings.extend(assets.warnings().iter().cloned());
-    let scene_name = options.scene.clone();
-    Ok(Job {
-        scene,
-        sensor,
-        film,
-        sampler,
-        integrator,
-        warnings,
+    let missing = "a part that is missing is a problem";
+    Ok(View {
+        sensor: sensor.expect(missing),
+        film: film.expect(missing),
+        sampler: sampler.expect(missing),
+        integrator: integrator.expect(missing),
         integrator_name,
-        scene_name,
     })
 }
 
-impl<C: ColorModel> Job<C> {
+/// Loads the shapes.
+pub(super) fn load(description: &Description, progress: &dyn Progress) -> Result<Assets> {
+    let shapes = description.root().children(Kind::Shape).len();
+    progress.begin(Phase::Load, shapes as u64);
+    Assets::load(description, &|| progress.advance(1, 0))
+}
+
+/// Loads the shapes and builds the scene, having made sure that there is room for it.
+fn make<C: ColorModel>(
+    description: &Description,
+    options: &Options,
+    color: C,
+    film: u64,
+    progress: &dyn Progress,
+    seconds: &mut Seconds,
+) -> Result<(Scene<C>, Facts)> {
+    let announced = Estimate {
+        film,
+        ..Estimate::of_files(description)
+    };
+    announced.check(options.memory_limit)?;
+    let assets = timed(&mut seconds.load, || load(description, progress))?;
+    let primitives = assets.primitive_count();
+    let loaded = Estimate {
+        film,
+        assets: assets.bytes() as u64,
+        trees: match options.method {
+            Method::Brute => 0,
+            Method::Tree => memory::trees(primitives),
+        },
+    };
+    loaded.check(options.memory_limit)?;
+    let scene = timed(&mut seconds.build, || {
+        progress.begin(Phase::Build, 1);
+        scene::build(description, &assets, color, options.method)
+    })?;
+    progress.advance(1, 0);
+    let facts = Facts {
+        primitives,
+        bounds: scene.tracer().bounds(),
+        bytes: [assets.bytes(), scene.tracer().tree_bytes()],
+        warnings: assets.warnings().to_vec(),
+    };
+    Ok((scene, facts))
+}
+
+/// Builds the job; `kept` is its scene where the description's is equal, else it makes room for the new one.
+pub(super) fn prepare<'k, C: ColorModel>(
+    kept: &'k mut Option<Kept>,
+    description: &Description,
+    options: &Options,
+    color: C,
+    progress: &dyn Progress,
+    seconds: &mut Seconds,
+) -> Result<Job<'k, C>> {
+    let mut problems = Problems::default();
+    let key = Key {
+        scene: fingerprint::scene_key(description),
+        colors: options.colors,
+        method: options.method,
+    };
+    let sensor = problems.take(sensor(description, options));
+    let view = sensor.and_then(|sensor| problems.take(view::<C>(description, sensor)));
+    let film = view.as_ref().map_or(0, |view| {
+        memory::film(&view.film, channels(&color, &view.integrator).len())
+    });
+    if kept.as_ref().is_some_and(|kept| kept.key == key) {
+        // The equal scene was built from the equal properties, all of them.
+        for property in description.root().all() {
+            property.mark_read();
+        }
+    } else {
+        *kept = None;
+        let made = make(description, options, color, film, progress, seconds);
+        *kept = problems.take(made).map(|(scene, facts)| Kept {
+            key,
+            scene: Box::new(scene),
+            facts,
+        });
+    }
+    if view.is_some() && kept.is_some() {
+        problems.extend(description.unread());
+    }
+    if let Err(error) = problems.finish() {
+        // Unread properties are told again the next time.
+        *kept = None;
+        return Err(error);
+    }
+    let (Some(view), Some(kept)) = (view, kept.as_ref()) else {
+        unreachable!("a part that is missing is a problem");
+    };
+    let facts = &kept.facts;
+    let (assets, trees) = (facts.bytes[0] as u64, facts.bytes[1] as u64);
+    Estimate {
+        film,
+        assets,
+        trees,
+    }
+    .check(options.memory_limit)?;
+    let mut warnings = description.warnings().to_vec();
+    warnings.extend(facts.warnings.iter().cloned());
+    Ok(Job {
+        scene: kept
+            .scene
+            .downcast_ref()
+            .expect("equal colours have equal types"),
+        facts,
+        view,
+        seed: options.seed,
+        warnings,
+    })
+}
+
+/// The sums' channels: the colours, the integrator's own and, last, opacity.
+fn channels<C: ColorModel>(color: &C, integrator: &Integrator<C>) -> Vec<String> {
+    let mut channels = color.channels();
+    channels.extend(integrator.extra_channels());
+    channels.push("A".into());
+    channels
+}
+
+impl<C: ColorModel> Job<'_, C> {
+    /// The sums' channels: the colours, the integrator's own and, last, opacity.
+    pub(super) fn channels(&self) -> Vec<String> {
+        channels(self.scene.color(), &self.view.integrator)
+    }
+
+    /// What the image depends on.
+    pub(super) fn fingerprint(description: &Description, options: &Options) -> Result<Fingerprint> {
+        Fingerprint::new(description, sensor(description, options)?, options)
+    }
+
     /// The crop's place on the film.
     pub(super) fn window(&self) -> Window {
         let Film {
@@ -127,7 +264,7 @@ impl<C: ColorModel> Job<C> {
             height,
             crop,
             ..
-        } = &self.film;
+        } = &self.view.film;
         Window {
             x: crop.x,
             y: crop.y,
@@ -136,34 +273,36 @@ impl<C: ColorModel> Job<C> {
         }
     }
 
-    /// The report as far as it is known before rendering.
-    pub(super) fn report(&self, options: &Options, assets: &Assets) -> Report {
+    /// The report, but for what rendering counted.
+    pub(super) fn report(&self, completed: Completed, seconds: Seconds) -> Report {
+        let crop = &self.view.film.crop;
         Report {
-            size: [self.film.crop.width, self.film.crop.height],
-            spp: self.sampler.sample_count(),
-            seed: options.seed,
+            size: [crop.width, crop.height],
+            spp: self.view.sampler.sample_count(),
+            completed,
+            seed: self.seed,
             threads: rayon::current_num_threads(),
-            primitives: assets.primitive_count(),
+            primitives: self.facts.primitives,
             lights: self.scene.light_count(),
-            bytes: [assets.bytes(), self.scene.tracer().tree_bytes()],
-            stats: Stats::default(),
+            bytes: self.facts.bytes,
+            stats: Default::default(),
             dropped_samples: 0,
             dropped_pixel: None,
-            seconds: Seconds::default(),
+            seconds,
         }
     }
 
     /// How the image was made.
-    pub(super) fn metadata(&self, report: &Report) -> Metadata {
-        let to_camera = self.sensor.world_to_camera();
+    pub(super) fn metadata(&self, scene_name: &str, report: &Report) -> Metadata {
+        let to_camera = self.view.sensor.world_to_camera();
         Metadata::default()
             .with("software", concat!("etendue ", env!("CARGO_PKG_VERSION")))
-            .with("scene", self.scene_name.as_str())
-            .with("integrator", self.integrator_name.as_str())
+            .with("scene", scene_name)
+            .with("integrator", self.view.integrator_name.as_str())
             .with("spp", report.spp)
+            .with("samples_complete", report.completed.samples)
             .with("seed", i64::try_from(report.seed).unwrap_or(i64::MAX))
-            .with("seconds", report.seconds.render)
             .with("world_to_camera", to_camera)
-            .with("world_to_ndc", self.sensor.projection() * to_camera)
+            .with("world_to_ndc", self.view.sensor.projection() * to_camera)
     }
 }

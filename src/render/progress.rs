@@ -1,4 +1,5 @@
-//! How a render tells its caller where it is, and asks whether to go on. The library prints nothing.
+//! How a render tells its caller where it is, and asks whether to go on. The library prints nothing and
+//! listens to no signal.
 
 /// What a render is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,6 +18,10 @@ pub trait Progress: Sync {
     fn begin(&self, phase: Phase, total: u64);
     /// `steps` more are done, which traced `rays` rays.
     fn advance(&self, steps: u64, rays: u64);
+    /// Whether to stop: no further tile is begun, and what is complete becomes the image.
+    fn stop(&self) -> bool {
+        false
+    }
 }
 
 /// Watches nothing.

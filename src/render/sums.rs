@@ -47,6 +47,37 @@ impl Sums {
         }
     }
 
+    /// Nothing yet, unless the memory for it is not there.
+    pub(super) fn try_new(window: Window, channels: Vec<String>) -> Result<Self> {
+        let mut sums = Self::new(Window { width: 0, ..window }, channels);
+        sums.window = window;
+        let size = sums.len();
+        sums.data.try_reserve_exact(size).map_err(|_| {
+            Error::input(format!(
+                "a film of {} × {} pixels does not fit into memory",
+                window.width, window.height
+            ))
+            .help("render it in crops")
+        })?;
+        sums.data.resize(size, 0.0);
+        Ok(sums)
+    }
+
+    /// How many sums there are.
+    fn len(&self) -> usize {
+        self.window.width as usize * self.window.height as usize * (self.channels.len() + 1)
+    }
+
+    /// All sums, pixel by pixel.
+    pub(super) fn data(&self) -> &[f64] {
+        &self.data
+    }
+
+    /// The same, to be filled with what was kept.
+    pub(super) fn data_mut(&mut self) -> &mut [f64] {
+        &mut self.data
+    }
+
     /// Adds a sample at `offset` (in [0, 1)²) within the pixel (x, y), in all pixels of the window that
     /// its filter reaches.
     pub(super) fn splat(

@@ -13,6 +13,7 @@ use crate::interaction::Ray;
 use crate::math::Transform;
 
 pub use film::{Film, PixelFormat, Window};
+pub(crate) use perspective::tangent_x;
 
 /// What every sensor does.
 pub trait Camera: std::fmt::Debug + Send + Sync {

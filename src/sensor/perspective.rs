@@ -23,7 +23,7 @@ pub struct Perspective {
 const HALF_DIAGONAL: f64 = 21.633_307_652_783_937;
 
 /// The tangent of half the horizontal field of view.
-fn tangent_x(properties: &Properties<'_>, aspect: f64) -> Result<f64> {
+pub(crate) fn tangent_x(properties: &Properties<'_>, aspect: f64) -> Result<f64> {
     let diagonal = (1.0 + 1.0 / (aspect * aspect)).sqrt();
     let Some(fov) = properties.float("fov")? else {
         let text = properties.string("focal_length")?.unwrap_or("50mm");

@@ -6,11 +6,10 @@ use std::sync::Arc;
 
 use glam::{Mat3, Vec2};
 
-use super::{Palette, Pattern, to_uv, transformed};
-use crate::color::{ColorModel, Role, Spectral, srgb};
+use super::{Palette, Pattern, Picture, to_uv, transformed};
+use crate::color::{ColorModel, Role, Spectral};
 use crate::description::Properties;
 use crate::error::Result;
-use crate::image::{self, Encoding, Limits};
 use crate::interaction::Interaction;
 
 /// An image whose texels are ready to be evaluated, row by row from the top.
@@ -117,36 +116,20 @@ fn load<C: ColorModel>(
     palette: &Palette<C>,
     raw: bool,
 ) -> Result<Texels<C>> {
-    let picture = image::read(path, &Limits::default())?;
-    let encoded = picture.encoding != Encoding::Linear && !raw;
-    let decode = |v: f32| if encoded { srgb::decode(v) } else { v };
-    let (width, height) = (picture.image.width(), picture.image.height());
-    let Some([r, g, b]) = picture.image.rgb() else {
-        let message = format!(
-            "{}: no colour channels among {:?}",
-            path.display(),
-            picture.image.channels()
-        );
-        return Err(crate::error::Error::input(message));
-    };
+    let picture = Picture::read(path, raw)?;
+    let [width, height] = picture.size();
     let role = if raw && palette.role == Role::Reflectance {
         Role::Quantity
     } else {
         palette.role
     };
-    let texel = |x, y| {
-        let rgb = [r, g, b].map(|c| decode(picture.image.get(x, y, c)));
-        palette
-            .color
-            .texel(rgb.map(|v| if v.is_finite() { v } else { 0.0 }), role)
-    };
-    let texels = (0..height)
-        .flat_map(|y| (0..width).map(move |x| (x, y)))
-        .map(|(x, y)| texel(x, y))
+    let texels = picture
+        .texels()
+        .map(|rgb| palette.color.texel(rgb, role))
         .collect();
     Ok(Texels {
-        width: width as usize,
-        height: height as usize,
+        width,
+        height,
         texels,
     })
 }
@@ -167,5 +150,9 @@ impl<C: ColorModel> Pattern<C> for Bitmap<C> {
         };
         let value = row(y) * (1.0 - f.y) + row(y.saturating_add(1)) * f.y;
         value.map(|v| if v.is_finite() { v } else { 0.0 })
+    }
+
+    fn resolution(&self) -> [usize; 2] {
+        [self.texels.width, self.texels.height]
     }
 }

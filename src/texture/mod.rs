@@ -3,6 +3,7 @@
 
 mod bitmap;
 mod checkerboard;
+mod picture;
 mod uniform;
 
 use std::collections::HashMap;
@@ -19,10 +20,17 @@ use crate::interaction::Interaction;
 
 use bitmap::Texels;
 
+pub use picture::Picture;
+
 /// What every texture does.
 pub trait Pattern<C: ColorModel>: std::fmt::Debug + Send + Sync {
     /// The value at a point of a surface.
     fn eval(&self, at: &Interaction<'_>, wavelengths: &C::Wavelengths) -> C::Sample;
+
+    /// Columns and rows of the image, if it is one; 1 × 1 otherwise.
+    fn resolution(&self) -> [usize; 2] {
+        [1, 1]
+    }
 }
 
 family! {

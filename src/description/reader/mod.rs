@@ -62,7 +62,7 @@ impl<'o> Reader<'o> {
             references: Vec::new(),
             lost_ids: LostIds::Some(BTreeSet::new()),
             scopes: Scopes::new(),
-            defines: Defines::new(&options.defines),
+            defines: Defines::new(&options.defines, &options.offers),
             report: Report::default(),
             warnings: Vec::new(),
             old_nodes: Vec::new(),

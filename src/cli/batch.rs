@@ -1,0 +1,160 @@
+//! What a call is to render: inputs × frames × sensors, each with an output of its own, known before the
+//! first of them is begun.
+
+use std::path::{Path, PathBuf};
+
+use etendue::description::{Description, NodeId};
+use etendue::error::{Error, Result};
+
+use super::output::Names;
+use super::parse::Frames;
+use super::scene::{SceneArguments, sensors};
+
+/// Which sensors of each scene.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Sensors {
+    All,
+    /// A number from 0, or an id.
+    One(String),
+}
+
+impl From<&str> for Sensors {
+    fn from(text: &str) -> Self {
+        match text {
+            "all" => Self::All,
+            one => Self::One(one.to_owned()),
+        }
+    }
+}
+
+/// One image.
+#[derive(Clone, Debug)]
+pub(super) struct Item {
+    pub(super) input: PathBuf,
+    pub(super) frame: Option<i64>,
+    /// In file order from 0.
+    pub(super) sensor: usize,
+    pub(super) output: PathBuf,
+}
+
+impl Item {
+    /// Where the render is kept: beside the image.
+    pub(super) fn checkpoint(&self) -> PathBuf {
+        let mut name = self.output.as_os_str().to_owned();
+        name.push(".checkpoint");
+        name.into()
+    }
+
+    /// For messages: `box.xml`, frame 7, sensor 1.
+    pub(super) fn name(&self) -> String {
+        let mut name = self.input.display().to_string();
+        if let Some(frame) = self.frame {
+            name += &format!(", frame {frame}");
+        }
+        if self.sensor > 0 {
+            name += &format!(", sensor {}", self.sensor);
+        }
+        name
+    }
+}
+
+/// The images of a call.
+#[derive(Debug, Default)]
+pub(super) struct Batch {
+    pub(super) items: Vec<Item>,
+    /// Inputs whose sensors could not be found out.
+    pub(super) failed: Vec<(PathBuf, Error)>,
+}
+
+/// What a batch is made of.
+#[derive(Debug)]
+pub(super) struct Request<'a> {
+    pub(super) inputs: &'a [PathBuf],
+    pub(super) frames: Option<Frames>,
+    /// The first sensor where absent.
+    pub(super) sensors: Option<&'a Sensors>,
+    pub(super) output: &'a str,
+    pub(super) scene: &'a SceneArguments,
+}
+
+impl Request<'_> {
+    /// All images, by input, frame and sensor.
+    pub(super) fn batch(&self) -> Result<Batch> {
+        let mut batch = Batch::default();
+        for input in self.inputs {
+            let chosen = match self.chosen(input) {
+                Ok(chosen) => chosen,
+                Err(error) => {
+                    batch.failed.push((input.clone(), error));
+                    continue;
+                }
+            };
+            for frame in self.numbers() {
+                for (sensor, label) in &chosen {
+                    let names = Names {
+                        input,
+                        frame: frame.unwrap_or(0),
+                        sensor: label,
+                    };
+                    batch.items.push(Item {
+                        input: input.clone(),
+                        frame,
+                        sensor: *sensor,
+                        output: names.expand(self.output)?,
+                    });
+                }
+            }
+        }
+        Ok(batch)
+    }
+
+    fn numbers(&self) -> Vec<Option<i64>> {
+        match self.frames {
+            Some(frames) => frames.iter().map(Some).collect(),
+            None => vec![None],
+        }
+    }
+
+    /// Numbers and names of the sensors that are meant. The scene is read only where they depend on it.
+    fn chosen(&self, input: &Path) -> Result<Vec<(usize, String)>> {
+        if self.sensors.is_none() && !self.output.contains("{sensor}") {
+            return Ok(vec![(0, String::new())]);
+        }
+        let frame = self.numbers()[0];
+        let description = self.scene.describe(input, &self.scene.options(frame))?;
+        let names = names(&description);
+        let all = names.iter().cloned().enumerate();
+        Ok(match self.sensors {
+            None => all.take(1).collect(),
+            Some(Sensors::All) => all.collect(),
+            Some(Sensors::One(one)) => {
+                let by_id = names.iter().position(|name| name == one);
+                let by_number = || one.parse().ok().filter(|n| *n < names.len());
+                let Some(found) = by_id.or_else(by_number) else {
+                    let error = Error::input(format!(
+                        "{} has no sensor {one:?}; there are {}",
+                        input.display(),
+                        names.join(", ")
+                    ));
+                    return Err(error.suggest(one, names.iter().map(String::as_str)));
+                };
+                vec![(found, names[found].clone())]
+            }
+        })
+    }
+}
+
+/// The sensors' ids, or their numbers where they have none.
+fn names(description: &Description) -> Vec<String> {
+    let name = |(number, id): (usize, NodeId)| {
+        let sensor = description.node(id);
+        sensor
+            .id()
+            .map_or_else(|| number.to_string(), str::to_owned)
+    };
+    sensors(description)
+        .into_iter()
+        .enumerate()
+        .map(name)
+        .collect()
+}

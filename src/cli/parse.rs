@@ -1,0 +1,178 @@
+//! The values of options: from text to numbers, windows, sizes and frames.
+
+use etendue::sensor::Window;
+
+type Parsed<T> = Result<T, String>;
+
+fn numbers<const N: usize>(text: &str, separator: char) -> Option<[u32; N]> {
+    let numbers: Vec<u32> = text
+        .split(separator)
+        .map(|t| t.trim().parse().ok())
+        .collect::<Option<_>>()?;
+    numbers.try_into().ok()
+}
+
+/// `640x480`
+pub(super) fn size(text: &str) -> Parsed<(u32, u32)> {
+    let [width, height] = numbers(text, 'x').ok_or("write it as WIDTHxHEIGHT, such as 640x480")?;
+    Ok((width, height))
+}
+
+/// `10,20,64,64`
+pub(super) fn crop(text: &str) -> Parsed<Window> {
+    let [x, y, width, height] =
+        numbers(text, ',').ok_or("write it as X,Y,WIDTH,HEIGHT, such as 10,20,64,64")?;
+    Ok(Window {
+        x,
+        y,
+        width,
+        height,
+    })
+}
+
+/// `name=value`
+pub(super) fn define(text: &str) -> Parsed<(String, String)> {
+    let (name, value) = text.split_once('=').ok_or("write it as name=value")?;
+    Ok((name.to_owned(), value.to_owned()))
+}
+
+/// A positive number of seconds.
+pub(super) fn seconds(text: &str) -> Parsed<std::time::Duration> {
+    /// About thirty years: nothing overflows.
+    const LONGEST: f64 = 1e9;
+    let seconds: f64 = text.parse().map_err(|_| "write a number of seconds")?;
+    if !(0.0..=LONGEST).contains(&seconds) {
+        return Err(format!("{text} is not between 0 and {LONGEST}"));
+    }
+    Ok(std::time::Duration::from_secs_f64(seconds))
+}
+
+/// A number of bytes: `500M`, `8G`, `7.5GiB`; `none` is without limit.
+pub(super) fn bytes(text: &str) -> Parsed<u64> {
+    if text == "none" {
+        return Ok(u64::MAX);
+    }
+    let end = text
+        .find(|c: char| !(c.is_ascii_digit() || c == '.'))
+        .unwrap_or(text.len());
+    let (number, unit) = text.split_at(end);
+    let factor = match unit.trim().to_lowercase().trim_end_matches('b') {
+        "" => 1.0,
+        "k" => 1e3,
+        "m" => 1e6,
+        "g" => 1e9,
+        "t" => 1e12,
+        "ki" => f64::from(1 << 10),
+        "mi" => f64::from(1 << 20),
+        "gi" => f64::from(1 << 30),
+        "ti" => 1024.0 * f64::from(1 << 30),
+        _ => {
+            return Err(format!(
+                "unknown unit {unit:?}; write it as 500M, 8G or 8GiB"
+            ));
+        }
+    };
+    let number: f64 = number
+        .parse()
+        .map_err(|_| "write it as 500M, 8G, 8GiB or none")?;
+    Ok((number * factor) as u64)
+}
+
+/// Numbers of frames.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Frames {
+    start: i64,
+    count: i64,
+    step: i64,
+}
+
+impl Frames {
+    /// The first `count` frames from 0.
+    pub(super) fn first(count: u32) -> Self {
+        Self {
+            start: 0,
+            count: count.into(),
+            step: 1,
+        }
+    }
+
+    /// The numbers in order.
+    pub(super) fn iter(self) -> impl Iterator<Item = i64> {
+        (0..self.count).map(move |i| self.start + i * self.step)
+    }
+}
+
+/// `start:end` without the end, `start:end:step`, or a single number.
+pub(super) fn frames(text: &str) -> Parsed<Frames> {
+    /// Both of frames and of their numbers.
+    const MOST: i64 = 1_000_000;
+    let numbers: Option<Vec<i64>> = text.split(':').map(|t| t.trim().parse().ok()).collect();
+    let (start, end, step) = match numbers.as_deref() {
+        Some([frame]) => (*frame, frame.saturating_add(1), 1),
+        Some([start, end]) => (*start, *end, 1),
+        Some([start, end, step]) => (*start, *end, *step),
+        _ => return Err("write it as START:END or START:END:STEP, such as 0:36".to_owned()),
+    };
+    let possible = -MOST..=MOST;
+    if ![start, end - 1, step].iter().all(|n| possible.contains(n)) {
+        return Err(format!("frames and steps lie between -{MOST} and {MOST}"));
+    }
+    if step < 1 {
+        return Err("the step must be at least 1".to_owned());
+    }
+    if end <= start {
+        return Err(format!(
+            "no frame lies from {start} up to, and without, {end}"
+        ));
+    }
+    Ok(Frames {
+        start,
+        count: (end - start + step - 1) / step,
+        step,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_go_up_to_their_end_and_leave_it_out() {
+        let list = |text: &str| frames(text).map(|f| f.iter().collect::<Vec<_>>());
+        assert_eq!(list("0:3").unwrap(), [0, 1, 2]);
+        assert_eq!(list("-2:5:3").unwrap(), [-2, 1, 4]);
+        assert_eq!(list("7").unwrap(), [7]);
+        for wrong in [
+            "",
+            "a",
+            "3:3",
+            "0:5:0",
+            "0:5:-1",
+            "0:99999999999",
+            "1:2:3:4",
+            "9223372036854775807",
+            "-9223372036854775808:0",
+        ] {
+            assert!(list(wrong).is_err(), "{wrong:?}");
+        }
+    }
+
+    #[test]
+    fn sizes_of_memory_have_units() {
+        assert_eq!(bytes("8G"), Ok(8_000_000_000));
+        assert_eq!(bytes("1.5 GiB"), Ok(3 << 29));
+        assert_eq!(bytes("512"), Ok(512));
+        assert_eq!(bytes("none"), Ok(u64::MAX));
+        for wrong in ["", "G", "8X", "1.2.3M", "-1"] {
+            assert!(bytes(wrong).is_err(), "{wrong:?}");
+        }
+    }
+
+    #[test]
+    fn durations_are_finite_and_not_negative() {
+        assert_eq!(seconds("0.5").unwrap().as_millis(), 500);
+        for wrong in ["-1", "inf", "NaN", "1e30", "1 min"] {
+            assert!(seconds(wrong).is_err(), "{wrong:?}");
+        }
+    }
+}

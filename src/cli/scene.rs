@@ -1,0 +1,82 @@
+//! What all commands that read scenes have in common: the options for them, and from a file to a
+//! description.
+
+use std::path::Path;
+
+use clap::{Args, ValueEnum};
+use etendue::description::{Description, Kind, NodeId, Options};
+use etendue::error::{Error, Result};
+use etendue::render::{self, UpAxis};
+
+use super::output::with_frame;
+use super::parse;
+
+/// How scenes are read.
+#[derive(Args, Debug)]
+pub(super) struct SceneArguments {
+    /// Value of a $name parameter of the scene; {frame} stands for the frame's number
+    #[arg(short = 'D', value_name = "NAME=VALUE", value_parser = parse::define)]
+    define: Vec<(String, String)>,
+    /// Which way is up in a bare mesh
+    #[arg(long, value_enum, default_value_t = Up::Y)]
+    up: Up,
+    /// Refuse what Mitsuba 3 would not read
+    #[arg(long)]
+    strict: bool,
+}
+
+/// Which way is up.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Up {
+    /// +y
+    Y,
+    /// +z
+    Z,
+}
+
+/// Whether the file is a scene, by its name.
+pub(super) fn is_scene(input: &Path) -> bool {
+    input
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("xml"))
+}
+
+impl SceneArguments {
+    /// The options for a frame of a scene.
+    pub(super) fn options(&self, frame: Option<i64>) -> Options {
+        let Some(frame) = frame else {
+            return Options {
+                defines: self.define.clone(),
+                strict: self.strict,
+                ..Options::default()
+            };
+        };
+        let define = |(name, value): &(String, String)| (name.clone(), with_frame(value, frame));
+        Options {
+            defines: self.define.iter().map(define).collect(),
+            offers: vec![("frame".to_owned(), frame.to_string())],
+            strict: self.strict,
+        }
+    }
+
+    /// The scene in the file, or around the mesh in it.
+    pub(super) fn describe(&self, input: &Path, options: &Options) -> Result<Description> {
+        if render::is_mesh(input) {
+            let up = match self.up {
+                Up::Y => UpAxis::Y,
+                Up::Z => UpAxis::Z,
+            };
+            return render::describe_mesh(input, up, options);
+        }
+        if is_scene(input) {
+            return Description::read(input, options);
+        }
+        let message = format!("{}: neither a scene nor a mesh", input.display());
+        Err(Error::input(message).help("a scene is an .xml file, a mesh a .ply or .obj"))
+    }
+}
+
+/// The sensors of a scene, in file order.
+pub(super) fn sensors(description: &Description) -> Vec<NodeId> {
+    description.children_of(description.root().node_id(), Kind::Sensor)
+}

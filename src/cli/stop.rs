@@ -1,0 +1,73 @@
+//! Signals: the first of Ctrl-C, SIGTERM (as batch systems send it) and SIGHUP asks the render to come to
+//! an end, a second one ends the process at once.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+use etendue::error::{Error, Result};
+use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::flag;
+
+use super::status;
+
+/// Whether a render should come to an end.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Stop {
+    signalled: Arc<AtomicBool>,
+    deadline: Option<Instant>,
+}
+
+impl Stop {
+    /// Listens to the signals from now on.
+    pub(super) fn on_signals() -> Result<Self> {
+        let signalled = Arc::new(AtomicBool::new(false));
+        let mut signals = vec![SIGINT, SIGTERM];
+        #[cfg(unix)]
+        signals.push(signal_hook::consts::SIGHUP);
+        signals.retain(|signal| !is_ignored(*signal));
+        for signal in signals {
+            // In this order: the flag is not set yet when the first signal asks for it.
+            flag::register_conditional_shutdown(
+                signal,
+                status::INTERRUPTED.into(),
+                signalled.clone(),
+            )
+            .and_then(|_| flag::register(signal, signalled.clone()))
+            .map_err(|e| Error::input(format!("cannot listen to signal {signal}: {e}")))?;
+        }
+        Ok(Self {
+            signalled,
+            deadline: None,
+        })
+    }
+
+    /// The same, and asks to stop at `deadline` too.
+    pub(super) fn by(&self, deadline: Option<Instant>) -> Self {
+        Self {
+            signalled: self.signalled.clone(),
+            deadline,
+        }
+    }
+
+    /// Whether a signal came.
+    pub(super) fn signalled(&self) -> bool {
+        self.signalled.load(Ordering::Relaxed)
+    }
+
+    /// Whether to stop, for whatever reason.
+    pub(super) fn asked(&self) -> bool {
+        self.signalled() || self.deadline.is_some_and(|d| Instant::now() >= d)
+    }
+}
+
+/// Whether the caller arranged for a signal to be ignored, as `nohup` does with SIGHUP: then it stays so.
+/// Known on Linux only.
+fn is_ignored(signal: i32) -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mask = status
+        .lines()
+        .find_map(|line| line.strip_prefix("SigIgn:"))
+        .and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+    mask.is_some_and(|mask| mask >> (signal - 1) & 1 == 1)
+}

@@ -1,0 +1,197 @@
+//! What a series of images came to, told as the arguments ask: a line or a JSON object for each image, a
+//! table of all, and the exit status.
+
+use std::path::Path;
+use std::time::Duration;
+
+use etendue::error::Error;
+use etendue::render::{Report, human_duration};
+use serde_json::{Value, json};
+
+use super::batch::Item;
+use super::{output, report, status};
+
+/// How much is told.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Style {
+    pub(super) quiet: bool,
+    pub(super) json: bool,
+    pub(super) stats: bool,
+}
+
+/// What became of an image.
+#[derive(Debug)]
+pub(super) enum Ending {
+    Rendered(Report),
+    /// Written as far as it was when a signal came.
+    Interrupted(Report),
+    /// Written as far as it was when its time was over.
+    TimeLimit(Report),
+    /// It was there.
+    Skipped,
+    /// A signal came before any of it was complete.
+    NotBegun,
+    Failed(Error),
+}
+
+impl Ending {
+    fn name(&self) -> &'static str {
+        match self {
+            Self::Rendered(_) => "rendered",
+            Self::Interrupted(_) => "interrupted",
+            Self::TimeLimit(_) => "time limit",
+            Self::Skipped => "skipped",
+            Self::NotBegun => "not begun",
+            Self::Failed(_) => "failed",
+        }
+    }
+
+    fn report(&self) -> Option<&Report> {
+        match self {
+            Self::Rendered(report) | Self::Interrupted(report) | Self::TimeLimit(report) => {
+                Some(report)
+            }
+            _ => None,
+        }
+    }
+}
+
+/// The warning that an image is not whole.
+pub(super) fn incomplete(item: &Item, report: &Report) -> Error {
+    let completed = &report.completed;
+    let ([passes, of_passes], [tiles, of_tiles]) = (completed.passes, completed.units);
+    let mut message = format!(
+        "{} is not whole: {passes} of {of_passes} passes ({tiles} of {of_tiles} tiles) are done, {} of {} samples a pixel",
+        item.output.display(),
+        completed.samples,
+        report.spp
+    );
+    if passes == 0 {
+        message += "; where no tile is done it is black";
+    }
+    Error::input(message)
+}
+
+/// Tells of one image.
+pub(super) fn tell(style: Style, item: &Item, ending: &Ending, total: Duration) {
+    if style.json {
+        return output::line(&object(item, ending, total).to_string());
+    }
+    let Some(report) = ending.report() else {
+        return;
+    };
+    if !style.quiet {
+        line(&item.output, report, total);
+    }
+    if style.stats {
+        stats(report);
+    }
+}
+
+fn object(item: &Item, ending: &Ending, total: Duration) -> Value {
+    let mut object = match ending.report() {
+        Some(report) => serde_json::to_value(report).expect("a report has only names and numbers"),
+        None => json!({}),
+    };
+    object["status"] = ending.name().into();
+    object["input"] = item.input.display().to_string().into();
+    object["output"] = item.output.display().to_string().into();
+    if let Some(frame) = item.frame {
+        object["frame"] = frame.into();
+    }
+    object["sensor"] = item.sensor.into();
+    if let Ending::Failed(error) = ending {
+        object["problems"] = report::json(error.problems());
+    }
+    if ending.report().is_some() {
+        object["seconds"]["total"] = total.as_secs_f64().into();
+    }
+    object
+}
+
+fn line(path: &Path, report: &Report, total: Duration) {
+    let [width, height] = report.size;
+    output::line(&format!(
+        "{}: {width}×{height}, {} samples a pixel, {}",
+        path.display(),
+        report.completed.samples,
+        human_duration(total)
+    ));
+}
+
+/// What was counted and timed.
+fn stats(report: &Report) {
+    let stats = &report.stats;
+    let rays = stats.rays().max(1) as f64;
+    let rate = rays / report.seconds.render.max(1e-9) * 1e-6;
+    let megabytes = |bytes: usize| bytes as f64 * 1e-6;
+    let [geometry, trees] = report.bytes.map(megabytes);
+    for (name, value) in [
+        ("primitives", report.primitives.to_string()),
+        ("lights", report.lights.to_string()),
+        (
+            "geometry, trees",
+            format!("{geometry:.1} MB, {trees:.1} MB"),
+        ),
+        ("camera rays", stats.camera_rays.to_string()),
+        ("bounce rays", stats.bounce_rays.to_string()),
+        ("shadow rays", stats.shadow_rays.to_string()),
+        ("points shaded", stats.shaded.to_string()),
+        (
+            "node steps a ray",
+            format!("{:.2}", stats.tracing.node_steps as f64 / rays),
+        ),
+        (
+            "primitive tests a ray",
+            format!("{:.2}", stats.tracing.primitive_tests as f64 / rays),
+        ),
+        ("seconds to load", format!("{:.3}", report.seconds.load)),
+        ("seconds to build", format!("{:.3}", report.seconds.build)),
+        (
+            "seconds to render",
+            format!("{:.3} ({rate:.2} M rays/s)", report.seconds.render),
+        ),
+    ] {
+        output::line(&format!("  {name:22} {value}"));
+    }
+}
+
+/// All images at a glance; JSON has had its object for each.
+pub(super) fn table(style: Style, endings: &[(String, Ending)]) {
+    if style.quiet || style.json {
+        return;
+    }
+    let mut counts: Vec<(&str, usize)> = Vec::new();
+    for (_, ending) in endings {
+        match counts.iter_mut().find(|(name, _)| *name == ending.name()) {
+            Some((_, count)) => *count += 1,
+            None => counts.push((ending.name(), 1)),
+        }
+    }
+    let counts: Vec<String> = counts
+        .iter()
+        .map(|(name, n)| format!("{n} {name}"))
+        .collect();
+    output::line(&format!("{} images: {}", endings.len(), counts.join(", ")));
+    for (name, ending) in endings {
+        let why = match ending {
+            Ending::Rendered(_) => continue,
+            Ending::Failed(error) => error.problems()[0].to_string(),
+            _ => String::new(),
+        };
+        let line = format!("  {:11} {name}  {why}", ending.name());
+        output::line(line.trim_end());
+    }
+}
+
+/// The exit status: an interruption's, else the gravest.
+pub(super) fn status(endings: &[(String, Ending)], signalled: bool) -> u8 {
+    if signalled {
+        return status::INTERRUPTED;
+    }
+    let of = |(_, ending): &(String, Ending)| match ending {
+        Ending::Failed(error) => status::of(error),
+        _ => status::DONE,
+    };
+    endings.iter().map(of).max().unwrap_or(status::DONE)
+}

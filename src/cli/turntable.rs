@@ -1,0 +1,106 @@
+//! A camera that goes around the scene: its pose is turned about the vertical axis through the scene's
+//! centre. The vertical axis is the axis of the world that is nearest to the camera's own, so that a
+//! camera that looks down a little goes around in a level circle.
+
+use etendue::description::{Description, NodeId, Value};
+use etendue::shape::Bounds;
+use glam::{DMat4, DVec3, DVec4};
+
+/// Turns the sensor by `turns` (1 is all around), counter-clockwise as seen from above.
+pub(super) fn turn(description: &mut Description, sensor: NodeId, bounds: &Bounds, turns: f64) {
+    let turns = turns.rem_euclid(1.0);
+    if turns == 0.0 || bounds.is_empty() {
+        return;
+    }
+    let center = 0.5 * (bounds.min.as_dvec3() + bounds.max.as_dvec3());
+    let turned = match description.get(sensor, "to_world") {
+        Some(Value::Animation(keyframes)) => {
+            let rotation = rotation(&keyframes[0].1, center, turns);
+            let turned = keyframes
+                .iter()
+                .map(|(time, pose)| (*time, rotation * *pose));
+            Value::Animation(turned.collect())
+        }
+        Some(Value::Transform(pose)) => Value::Transform(rotation(pose, center, turns) * *pose),
+        _ => Value::Transform(rotation(&DMat4::IDENTITY, center, turns)),
+    };
+    description.set(sensor, "to_world", turned);
+}
+
+fn rotation(pose: &DMat4, center: DVec3, turns: f64) -> DMat4 {
+    let angle = turns * std::f64::consts::TAU;
+    DMat4::from_translation(center)
+        * DMat4::from_axis_angle(vertical(pose.y_axis), angle)
+        * DMat4::from_translation(-center)
+}
+
+/// The axis of the world nearest to a camera's own vertical.
+fn vertical(up: DVec4) -> DVec3 {
+    [DVec3::Y, DVec3::Z, DVec3::X]
+        .into_iter()
+        .flat_map(|axis| [axis, -axis])
+        .max_by(|a, b| {
+            let [a, b] = [a, b].map(|axis| axis.dot(up.truncate()));
+            a.total_cmp(&b)
+        })
+        .unwrap_or(DVec3::Y)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use etendue::description::{Kind, Options};
+    use glam::Vec3;
+
+    use super::*;
+
+    fn turned(to_world: &str, turns: f64) -> DMat4 {
+        let text = format!(
+            "<scene version='3.0.0'><sensor type='perspective'>{to_world}</sensor></scene>"
+        );
+        let mut scene =
+            Description::parse(&text, Path::new("test.xml"), &Options::default()).unwrap();
+        let sensor = scene.children_of(scene.root().node_id(), Kind::Sensor)[0];
+        let bounds = Bounds {
+            min: Vec3::new(0.0, -5.0, -1.0),
+            max: Vec3::new(2.0, 5.0, 1.0),
+        };
+        turn(&mut scene, sensor, &bounds, turns);
+        match scene.get(sensor, "to_world") {
+            Some(Value::Transform(pose)) => *pose,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn a_camera_that_looks_down_goes_around_in_a_level_circle() {
+        let to_world = "<transform name='to_world'><lookat origin='1, 4, 6' target='1, 0, 0' up='0, 1, 0'/></transform>";
+        let still = turned(to_world, 0.0);
+        for quarter in 1..8 {
+            let pose = turned(to_world, f64::from(quarter) / 4.0);
+            let origin = pose.w_axis.truncate();
+            let expected = [
+                DVec3::new(1.0, 4.0, 6.0),
+                DVec3::new(7.0, 4.0, 0.0),
+                DVec3::new(1.0, 4.0, -6.0),
+                DVec3::new(-5.0, 4.0, 0.0),
+            ][quarter as usize % 4];
+            assert!((origin - expected).length() < 1e-9, "{quarter}: {origin}");
+            assert!((pose.y_axis.y - still.y_axis.y).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn what_is_up_for_the_camera_is_up_for_the_turn() {
+        let to_world = "<transform name='to_world'><lookat origin='1, 6, 2' target='1, 0, 0' up='0, 0, 1'/></transform>";
+        let origin = turned(to_world, 0.5).w_axis.truncate();
+        assert!((origin - DVec3::new(1.0, -6.0, 2.0)).length() < 1e-9);
+    }
+
+    #[test]
+    fn a_camera_without_a_pose_turns_too() {
+        let origin = turned("", 0.5).w_axis.truncate();
+        assert!((origin - DVec3::new(2.0, 0.0, 0.0)).length() < 1e-9);
+    }
+}

@@ -1,0 +1,203 @@
+//! `aov`: what the camera sees beside light, as channels of their own. `aovs` lists them as
+//! `name:kind, …`; nested integrators give the image itself (the first) and, where they have a name,
+//! channels `name.R` and so on. Where the camera sees nothing a channel is 0.
+
+use super::{Estimate, Estimates, Estimator, Integrator, Start, Stats};
+use crate::color::{ColorModel, Spectral};
+use crate::description::{Kind, Properties, Property, Value};
+use crate::error::Result;
+use crate::interaction::{Interaction, Ray};
+use crate::sampler::Sampler;
+use crate::scene::Scene;
+
+/// What a channel group shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Quantity {
+    Albedo,
+    Depth,
+    DpDu,
+    DpDv,
+    GeoNormal,
+    Position,
+    PrimIndex,
+    ShapeIndex,
+    ShNormal,
+    Uv,
+}
+
+/// Kinds as scene files name them, and the suffixes of their channels.
+const QUANTITIES: &[(&str, Quantity, &[&str])] = &[
+    ("albedo", Quantity::Albedo, &["R", "G", "B"]),
+    ("depth", Quantity::Depth, &["T"]),
+    ("dp_du", Quantity::DpDu, &["X", "Y", "Z"]),
+    ("dp_dv", Quantity::DpDv, &["X", "Y", "Z"]),
+    ("geo_normal", Quantity::GeoNormal, &["X", "Y", "Z"]),
+    ("position", Quantity::Position, &["X", "Y", "Z"]),
+    ("prim_index", Quantity::PrimIndex, &["I"]),
+    ("sh_normal", Quantity::ShNormal, &["X", "Y", "Z"]),
+    ("shape_index", Quantity::ShapeIndex, &["I"]),
+    ("uv", Quantity::Uv, &["U", "V"]),
+];
+
+/// A nested integrator.
+#[derive(Debug)]
+struct Nested<C: ColorModel> {
+    /// Empty where the file gives none.
+    name: String,
+    integrator: Box<dyn Estimator<C>>,
+}
+
+/// The channels and the nested integrators.
+#[derive(Debug)]
+pub struct Aov<C: ColorModel> {
+    quantities: Vec<(String, Quantity, &'static [&'static str])>,
+    nested: Vec<Nested<C>>,
+}
+
+impl<C: ColorModel> Aov<C> {
+    pub(super) fn build(properties: &Properties<'_>, context: &()) -> Result<Self> {
+        let mut quantities = Vec::new();
+        for item in properties
+            .string("aovs")?
+            .unwrap_or_default()
+            .split(',')
+            .map(str::trim)
+        {
+            if item.is_empty() {
+                continue;
+            }
+            let Some((name, kind)) = item.split_once(':') else {
+                let error =
+                    properties.error("aovs", format!("\"{item}\" does not say what it shows"));
+                return Err(error.help("write it as name:kind, such as dd:depth"));
+            };
+            let kinds = QUANTITIES.iter().map(|(kind, ..)| *kind);
+            let Some((_, quantity, suffixes)) = QUANTITIES.iter().find(|(k, ..)| *k == kind.trim())
+            else {
+                let all = kinds.clone().collect::<Vec<_>>().join(", ");
+                let error = properties.error("aovs", format!("unknown kind \"{}\"", kind.trim()));
+                return Err(error
+                    .suggest(kind.trim(), kinds)
+                    .help(format!("there are {all}")));
+            };
+            quantities.push((name.trim().to_owned(), *quantity, *suffixes));
+        }
+        let mut nested = Vec::new();
+        for child in properties.children(Kind::Integrator) {
+            let is_child =
+                |p: &&Property| matches!(p.value, Value::Object(id) if id == child.node_id());
+            let name = properties
+                .all()
+                .iter()
+                .find(is_child)
+                .map_or("", |p| &p.name);
+            let integrator = Box::new(Integrator::<C>::build(&child, context)?);
+            nested.push(Nested {
+                name: name.to_owned(),
+                integrator,
+            });
+        }
+        Ok(Self { quantities, nested })
+    }
+}
+
+impl<C: ColorModel> Estimator<C> for Aov<C> {
+    fn extra_channels(&self) -> Vec<String> {
+        let mut channels = Vec::new();
+        for Nested { name, integrator } in &self.nested {
+            channels.extend(integrator.extra_channels());
+            if !name.is_empty() {
+                channels.extend(["R", "G", "B", "A"].map(|c| format!("{name}.{c}")));
+            }
+        }
+        for (name, _, suffixes) in &self.quantities {
+            channels.extend(suffixes.iter().map(|suffix| format!("{name}.{suffix}")));
+        }
+        channels
+    }
+
+    fn estimate(
+        &self,
+        scene: &Scene<C>,
+        sampler: &Sampler,
+        starts: &[Start<C>],
+        estimates: &mut Estimates<C::Sample>,
+        stats: &mut Stats,
+    ) {
+        let mut children = Vec::with_capacity(self.nested.len());
+        for Nested { integrator, .. } in &self.nested {
+            let mut child = Estimates {
+                values: Vec::new(),
+                extra: Vec::new(),
+            };
+            integrator.estimate(scene, sampler, starts, &mut child, stats);
+            children.push((child, integrator.extra_channels().len()));
+        }
+        let rays: Vec<Ray> = starts.iter().map(|s| s.ray).collect();
+        let mut hits = Vec::new();
+        stats.camera_rays += rays.len() as u64;
+        scene.closest(&rays, &mut hits, &mut stats.tracing);
+
+        estimates.values.clear();
+        estimates.extra.clear();
+        let mut developed = vec![0.0; scene.color().channels().len()];
+        for (i, (start, hit)) in starts.iter().zip(&hits).enumerate() {
+            let alpha = if hit.is_miss() { 0.0 } else { 1.0 };
+            let nothing = Estimate {
+                radiance: C::Sample::zero(),
+                alpha,
+            };
+            estimates.values.push(
+                children
+                    .first()
+                    .map_or(nothing, |(child, _)| child.values[i]),
+            );
+            for (Nested { name, .. }, (child, extra)) in self.nested.iter().zip(&children) {
+                estimates
+                    .extra
+                    .extend_from_slice(&child.extra[i * extra..][..*extra]);
+                if !name.is_empty() {
+                    let Estimate { radiance, alpha } = &child.values[i];
+                    scene
+                        .color()
+                        .develop(radiance, &start.wavelengths, &mut developed);
+                    estimates.extra.extend_from_slice(&developed[..3]);
+                    estimates.extra.push(*alpha);
+                }
+            }
+            let at = (!hit.is_miss()).then(|| scene.interaction(&start.ray, hit));
+            for (_, quantity, suffixes) in &self.quantities {
+                let values = at
+                    .as_ref()
+                    .map_or([0.0; 3], |at| show(*quantity, scene, start, at));
+                estimates.extra.extend_from_slice(&values[..suffixes.len()]);
+            }
+        }
+    }
+}
+
+/// The quantity's channels at a point; those that it does not have are 0.
+fn show<C: ColorModel>(
+    quantity: Quantity,
+    scene: &Scene<C>,
+    start: &Start<C>,
+    at: &Interaction<'_>,
+) -> [f32; 3] {
+    match quantity {
+        Quantity::Albedo => {
+            let mut row = vec![0.0; scene.color().channels().len()];
+            let albedo = scene.material(at).albedo(at, &start.wavelengths);
+            scene.color().develop(&albedo, &start.wavelengths, &mut row);
+            [row[0], row[1], row[2]]
+        }
+        Quantity::Depth => [at.t, 0.0, 0.0],
+        Quantity::DpDu => at.dp_du.to_array(),
+        Quantity::DpDv => at.dp_dv.to_array(),
+        Quantity::GeoNormal => at.normal.to_array(),
+        Quantity::Position => at.position.to_array(),
+        Quantity::PrimIndex => [at.primitive as f32, 0.0, 0.0],
+        Quantity::ShapeIndex => [at.shape as f32, 0.0, 0.0],
+        Quantity::ShNormal => at.frame.n.to_array(),
+        Quantity::Uv => [at.uv.x, at.uv.y, 0.0],
+    }
+}

@@ -1,0 +1,47 @@
+//! `depth`: the distance from the camera to what it sees, as a grey; 0 where it sees nothing.
+
+use super::{Estimate, Estimates, Estimator, Start, Stats};
+use crate::color::{ColorModel, Spectral};
+use crate::description::Properties;
+use crate::error::Result;
+use crate::interaction::Ray;
+use crate::sampler::Sampler;
+use crate::scene::Scene;
+
+/// No settings.
+#[derive(Clone, Copy, Debug)]
+pub struct Depth;
+
+impl Depth {
+    pub(super) fn build(_properties: &Properties<'_>, _context: &()) -> Result<Self> {
+        Ok(Self)
+    }
+}
+
+impl<C: ColorModel> Estimator<C> for Depth {
+    fn estimate(
+        &self,
+        scene: &Scene<C>,
+        _sampler: &Sampler,
+        starts: &[Start<C>],
+        estimates: &mut Estimates<C::Sample>,
+        stats: &mut Stats,
+    ) {
+        let rays: Vec<Ray> = starts.iter().map(|s| s.ray).collect();
+        let mut hits = Vec::new();
+        stats.camera_rays += rays.len() as u64;
+        scene.closest(&rays, &mut hits, &mut stats.tracing);
+        estimates.values.clear();
+        estimates.values.extend(hits.iter().map(|hit| {
+            let (depth, alpha) = if hit.is_miss() {
+                (0.0, 0.0)
+            } else {
+                (hit.t, 1.0)
+            };
+            Estimate {
+                radiance: C::Sample::splat(depth),
+                alpha,
+            }
+        }));
+    }
+}

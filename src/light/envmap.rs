@@ -1,0 +1,158 @@
+//! `envmap`: light from all around by the image in `filename`, as latitude and longitude: u = atan2(x, −z)/2π
+//! and v = acos(y)/π in the emitter's space, which `to_world` turns. `scale` multiplies the image's values.
+//!
+//! As in Mitsuba, a texel of a row stands in the middle of its share of the circle, but the first and the
+//! last row stand at the poles. Directions are drawn cell by cell: a cell lies between four texels, and its
+//! weight is their mean luminance times its solid angle, so that no direction that emits is left out.
+
+use std::f32::consts::{PI, TAU};
+
+use glam::{Mat3, Vec2, Vec3};
+
+use super::{Emitter, LightContext, LightSample, rotation};
+use crate::color::{ColorModel, Role, luminance};
+use crate::description::Properties;
+use crate::error::Result;
+use crate::math::distribution::Grid;
+use crate::texture::Picture;
+
+/// An image of the surroundings.
+#[derive(Clone, Debug)]
+pub struct Envmap<C: ColorModel> {
+    width: usize,
+    height: usize,
+    texels: Vec<C::Texel>,
+    scale: f32,
+    to_world: Mat3,
+    /// Over [`Point`]s; `None` where all is black.
+    cells: Option<Grid>,
+}
+
+/// A place on the grid of cells, in [0, 1]²: 0 is the first texel's centre across, the first row's down.
+type Point = Vec2;
+
+/// The smallest sine of the polar angle that densities know of.
+const LEAST_SINE: f32 = 1e-7;
+
+impl<C: ColorModel> Envmap<C> {
+    pub(super) fn build(
+        properties: &Properties<'_>,
+        context: &LightContext<'_, C>,
+    ) -> Result<Self> {
+        let Some(path) = properties.file("filename")? else {
+            return Err(properties.error("filename", "an envmap needs a filename"));
+        };
+        let scale = properties.float("scale")?.unwrap_or(1.0);
+        if scale < 0.0 {
+            let message = format!("emission cannot be negative, and the scale {scale} is");
+            return Err(properties.error("scale", message));
+        }
+        // Which directions are drawn is free.
+        properties.boolean("mis_compensation")?;
+        let to_world = rotation(properties)?;
+        let picture = Picture::read(&path, false).map_err(|e| e.at(properties.location()))?;
+        let [width, height] = picture.size();
+        if width < 2 || height < 3 {
+            let message =
+                format!("an envmap needs 2 × 3 texels at least, and has {width} × {height}");
+            return Err(properties.error("filename", message));
+        }
+        let color = &context.palettes.colors.color;
+        Ok(Self {
+            width,
+            height,
+            texels: picture
+                .texels()
+                .map(|rgb| color.texel(rgb, Role::Emission))
+                .collect(),
+            scale: scale as f32,
+            to_world,
+            cells: Grid::new(width, &weights(&picture)).filter(|_| scale > 0.0),
+        })
+    }
+
+    /// Where a direction lies.
+    fn point(&self, direction: Vec3) -> Point {
+        let local = self.to_world.transpose() * direction;
+        let u = local.x.atan2(-local.z) / TAU - 0.5 / self.width as f32;
+        // Not the arc cosine, which has no precision at the poles.
+        let v = local.x.hypot(local.z).atan2(local.y) / PI;
+        Vec2::new(u - u.floor(), v)
+    }
+
+    /// The direction that lies there, and the sine of its polar angle.
+    fn direction(&self, p: Point) -> (Vec3, f32) {
+        let (sin_phi, cos_phi) = (TAU * (p.x + 0.5 / self.width as f32)).sin_cos();
+        let (sin, cos) = (PI * p.y).sin_cos();
+        let local = Vec3::new(sin * sin_phi, cos, -sin * cos_phi);
+        ((self.to_world * local).normalize(), sin)
+    }
+
+    fn radiance(&self, p: Point, wavelengths: &C::Wavelengths) -> C::Sample {
+        let q = p * Vec2::new(self.width as f32, (self.height - 1) as f32);
+        let x = (q.x as usize).min(self.width - 1);
+        let y = (q.y as usize).min(self.height - 2);
+        let f = q - Vec2::new(x as f32, y as f32);
+        let texel = |x, y| C::evaluate_texel(&self.texels[y * self.width + x], wavelengths);
+        let next = (x + 1) % self.width;
+        let row = |y| texel(x, y) * (1.0 - f.x) + texel(next, y) * f.x;
+        (row(y) * (1.0 - f.y) + row(y + 1) * f.y) * self.scale
+    }
+
+    /// Density per solid angle of a point drawn with that density.
+    fn per_solid_angle(density: f32, sine: f32) -> f32 {
+        density / (TAU * PI * sine.max(LEAST_SINE))
+    }
+}
+
+/// What each cell may emit, row by row.
+fn weights(picture: &Picture) -> Vec<f64> {
+    let [width, height] = picture.size();
+    let bright: Vec<f32> = picture
+        .texels()
+        .map(|rgb| luminance(rgb.map(f32::abs)))
+        .collect();
+    let cosine = |row: usize| (std::f64::consts::PI * row as f64 / (height - 1) as f64).cos();
+    let mut weights = Vec::with_capacity(width * (height - 1));
+    for y in 0..height - 1 {
+        let angle = cosine(y) - cosine(y + 1);
+        let column = |x| f64::from(bright[y * width + x]) + f64::from(bright[(y + 1) * width + x]);
+        weights.extend((0..width).map(|x| angle * (column(x) + column((x + 1) % width))));
+    }
+    weights
+}
+
+impl<C: ColorModel> Emitter<C> for Envmap<C> {
+    fn sample(
+        &self,
+        _from: Vec3,
+        u: Vec2,
+        wavelengths: &C::Wavelengths,
+    ) -> Option<LightSample<C::Sample>> {
+        let (p, density) = self.cells.as_ref()?.sample(u);
+        let (direction, sine) = self.direction(p);
+        Some(LightSample {
+            direction,
+            target: None,
+            radiance: self.radiance(p, wavelengths),
+            pdf: Self::per_solid_angle(density, sine),
+            delta: false,
+        })
+    }
+
+    fn is_environment(&self) -> bool {
+        true
+    }
+
+    fn environment_radiance(&self, direction: Vec3, wavelengths: &C::Wavelengths) -> C::Sample {
+        self.radiance(self.point(direction), wavelengths)
+    }
+
+    fn environment_pdf(&self, direction: Vec3) -> f32 {
+        let Some(cells) = &self.cells else {
+            return 0.0;
+        };
+        let p = self.point(direction);
+        Self::per_solid_angle(cells.pdf(p), (PI * p.y).sin())
+    }
+}

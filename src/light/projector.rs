@@ -1,0 +1,77 @@
+//! `projector`: a camera turned round: `irradiance` is an image that it throws out, times `scale`, through the
+//! field of view `fov`, `fov_axis` or `focal_length` as of a `perspective` sensor with the image's aspect. A
+//! plane at distance 1 across the axis gets π times the image's values, at distance z that over z².
+
+use std::f32::consts::PI;
+
+use glam::{Vec2, Vec3};
+
+use super::{Emitter, LightContext, LightSample, texture_point, to_world};
+use crate::color::{Color, ColorModel, Role};
+use crate::description::Properties;
+use crate::error::Result;
+use crate::math::Transform;
+use crate::sensor::tangent_x;
+use crate::texture::Texture;
+
+/// A point that throws an image.
+#[derive(Clone, Debug)]
+pub struct Projector<C: ColorModel> {
+    image: Texture<C>,
+    scale: f32,
+    to_world: Transform,
+    /// Half the image's extent at distance 1.
+    half: Vec2,
+}
+
+impl<C: ColorModel> Projector<C> {
+    pub(super) fn build(
+        properties: &Properties<'_>,
+        context: &LightContext<'_, C>,
+    ) -> Result<Self> {
+        if !properties.has("irradiance") {
+            return Err(properties.error("irradiance", "a projector needs an irradiance"));
+        }
+        let colors = &context.palettes.colors;
+        let image = colors.texture(properties, "irradiance", Role::Emission, Color::D65(1.0))?;
+        let [width, height] = image.resolution();
+        let aspect = width as f64 / height as f64;
+        let tangent = tangent_x(properties, aspect)?;
+        Ok(Self {
+            image,
+            scale: properties.float("scale")?.unwrap_or(1.0) as f32,
+            to_world: to_world(properties)?,
+            half: Vec2::new(tangent as f32, (tangent / aspect) as f32),
+        })
+    }
+}
+
+impl<C: ColorModel> Emitter<C> for Projector<C> {
+    fn sample(
+        &self,
+        from: Vec3,
+        _u: Vec2,
+        wavelengths: &C::Wavelengths,
+    ) -> Option<LightSample<C::Sample>> {
+        let local = self.to_world.inverse().point(from);
+        // As a camera sees it, +x is to the image's left and +y up.
+        let uv = 0.5 - 0.5 * local.truncate() / (local.z * self.half);
+        if local.z <= 0.0 || !(uv.cmpge(Vec2::ZERO) & uv.cmple(Vec2::ONE)).all() {
+            return None;
+        }
+        let position = self.to_world.translation();
+        let way = position - from;
+        let direction = way.normalize();
+        let cosine = -self.to_world.vector(Vec3::Z).dot(direction);
+        let image = self
+            .image
+            .eval(&texture_point(position, Vec3::Z, uv), wavelengths);
+        Some(LightSample {
+            direction,
+            target: Some(position),
+            radiance: image * (PI * self.scale / (local.z * local.z * cosine)),
+            pdf: 1.0,
+            delta: true,
+        })
+    }
+}

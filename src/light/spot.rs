@@ -1,0 +1,105 @@
+//! `spot`: light from the origin of `to_world` along its z axis, `intensity` on the axis, the same within
+//! `beam_width` (¾ of the cutoff by default) and from there falling with the angle to nothing at
+//! `cutoff_angle` (20), both in degrees from the axis. `texture` is a slide that just fills the cutoff.
+
+use glam::{Vec2, Vec3};
+
+use super::{Emitter, LightContext, LightSample, texture_point, to_world};
+use crate::color::{Color, ColorModel, Role};
+use crate::description::{Kind, Properties};
+use crate::error::Result;
+use crate::math::Transform;
+use crate::texture::Texture;
+
+/// A point that gives light into a cone.
+#[derive(Clone, Debug)]
+pub struct Spot<C: ColorModel> {
+    intensity: C::Stored,
+    slide: Option<Texture<C>>,
+    to_world: Transform,
+    /// In radians.
+    cutoff: f32,
+    /// In radians.
+    beam: f32,
+}
+
+impl<C: ColorModel> Spot<C> {
+    pub(super) fn build(
+        properties: &Properties<'_>,
+        context: &LightContext<'_, C>,
+    ) -> Result<Self> {
+        let cutoff = properties.float("cutoff_angle")?.unwrap_or(20.0);
+        let widest = if properties.has("texture") {
+            89.0
+        } else {
+            180.0
+        };
+        if !(cutoff > 0.0 && cutoff <= widest) {
+            let message = format!("a cutoff angle of {cutoff}° is not between 0° and {widest}°");
+            return Err(properties.error("cutoff_angle", message));
+        }
+        let beam = properties.float("beam_width")?.unwrap_or(0.75 * cutoff);
+        if !(0.0..=cutoff).contains(&beam) {
+            let message =
+                format!("a beam width of {beam}° is not between 0° and the cutoff angle {cutoff}°");
+            return Err(properties.error("beam_width", message));
+        }
+        let colors = &context.palettes.colors;
+        let light = (Role::Emission, Color::D65(1.0));
+        let slide = match properties.object("texture")? {
+            Some(child) if child.kind() == Kind::Texture => Some(Texture::build(
+                &child,
+                &colors.with_role(Role::Reflectance),
+            )?),
+            Some(_) => return Err(properties.error("texture", "a texture is wanted here")),
+            None => None,
+        };
+        Ok(Self {
+            intensity: colors.color(properties, "intensity", light.0, light.1)?,
+            slide,
+            to_world: to_world(properties)?,
+            cutoff: cutoff.to_radians() as f32,
+            beam: beam.to_radians() as f32,
+        })
+    }
+
+    /// How much of the intensity leaves at that angle from the axis.
+    fn falloff(&self, angle: f32) -> f32 {
+        if angle <= self.beam {
+            1.0
+        } else {
+            ((self.cutoff - angle) / (self.cutoff - self.beam)).max(0.0)
+        }
+    }
+}
+
+impl<C: ColorModel> Emitter<C> for Spot<C> {
+    fn sample(
+        &self,
+        from: Vec3,
+        _u: Vec2,
+        wavelengths: &C::Wavelengths,
+    ) -> Option<LightSample<C::Sample>> {
+        let position = self.to_world.translation();
+        let way = position - from;
+        let squared = way.length_squared();
+        let local = self.to_world.inverse().vector(-way);
+        // Not the arc cosine, which has no precision near the axis.
+        let falloff = self.falloff(local.truncate().length().atan2(local.z));
+        if squared <= 0.0 || falloff <= 0.0 {
+            return None;
+        }
+        let mut radiance = C::evaluate(&self.intensity, wavelengths) * (falloff / squared);
+        if let Some(slide) = &self.slide {
+            let uv = 0.5 + 0.5 * local.truncate() / (local.z * self.cutoff.tan());
+            radiance *= slide.eval(&texture_point(position, Vec3::Z, uv), wavelengths);
+        }
+        Some(LightSample {
+            direction: way / squared.sqrt(),
+            target: Some(position),
+            radiance,
+            pdf: 1.0,
+            delta: true,
+        })
+    }
+}

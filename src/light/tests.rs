@@ -1,0 +1,199 @@
+//! What every light must do, and Mitsuba's numbers for those that look at an image.
+
+use super::*;
+use crate::color::{Rgb, Samples};
+use crate::description::{Description, Kind, Options};
+use crate::image::{self, Image, Metadata};
+use crate::math::{random, warp};
+
+/// An image of `width` × 3 texels of `value`, in a folder of its own.
+struct Pictures(tempfile::TempDir);
+
+impl Pictures {
+    fn new() -> Self {
+        Self(tempfile::tempdir().expect("a folder for temporary files"))
+    }
+
+    fn add(&self, name: &str, width: u32, value: impl Fn(u32, u32) -> [f32; 3]) {
+        let mut picture = Image::new(width, 3, ["R", "G", "B"].map(String::from).to_vec());
+        for (x, y) in (0..3).flat_map(|y| (0..width).map(move |x| (x, y))) {
+            for (c, v) in value(x, y).into_iter().enumerate() {
+                picture.set(x, y, c, v);
+            }
+        }
+        image::write(&self.0.path().join(name), &picture, &Metadata::default()).unwrap();
+    }
+
+    fn light(&self, text: &str) -> Light<Rgb> {
+        self.try_light(text).unwrap()
+    }
+
+    fn try_light(&self, text: &str) -> Result<Light<Rgb>> {
+        let text = format!(r#"<scene version="3.0.0">{text}</scene>"#);
+        let scene =
+            Description::parse(&text, &self.0.path().join("test.xml"), &Options::default())?;
+        let palettes = Palettes::new(Rgb);
+        let context = LightContext {
+            palettes: &palettes,
+            shape: None,
+        };
+        let light = Light::build(&scene.root().children(Kind::Emitter)[0], &context)?;
+        assert_eq!(scene.unread(), []);
+        Ok(light)
+    }
+}
+
+fn point(seed: u64, i: u32) -> Vec2 {
+    let unit = |n| random::unit(random::bits(seed, n));
+    Vec2::new(unit(2 * i), unit(2 * i + 1))
+}
+
+fn near(a: Samples<3>, b: [f32; 3]) -> bool {
+    (0..3).all(|c| (a.0[c] - b[c]).abs() <= 2e-5 * b[c].abs())
+}
+
+/// What was probed with Mitsuba 3.9.1 `scalar_rgb`.
+fn gradient(pictures: &Pictures) -> Light<Rgb> {
+    pictures.add("env.exr", 4, |x, y| {
+        let v = (1 + x + 10 * y) as f32;
+        [v, 2.0 * v, 0.5 * v]
+    });
+    pictures.light(
+        r#"<emitter type="envmap"><string name="filename" value="env.exr"/><float name="scale" value="2"/>
+           <transform name="to_world"><rotate x="1" angle="30"/></transform></emitter>"#,
+    )
+}
+
+#[test]
+fn an_envmap_looks_as_mitsuba_s_does() {
+    let light = gradient(&Pictures::new());
+    for (direction, red) in [
+        ([1.0, 0.0, 0.0], 23.0),
+        ([0.0, 0.0, -1.0], 31.666_664),
+        ([0.1, 0.2, -0.9], 28.426_64),
+        ([-0.6, -0.7, 0.2], 33.298_428),
+        ([0.0, 1.0, 0.0], 11.666_667),
+        ([0.3, 0.9, 0.3], 6.928_572_7),
+    ] {
+        let direction = Vec3::from_array(direction).normalize();
+        let radiance = light.environment_radiance(direction, &());
+        assert!(
+            near(radiance, [red, 2.0 * red, 0.5 * red]),
+            "{direction} {radiance:?}"
+        );
+    }
+}
+
+#[test]
+fn every_environment_is_drawn_with_the_density_that_it_says_and_missed_nowhere() {
+    let pictures = Pictures::new();
+    pictures.add("sun.exr", 16, |x, y| {
+        if (x, y) == (3, 1) {
+            [500.0, 400.0, 0.0]
+        } else {
+            [0.0; 3]
+        }
+    });
+    let sun = pictures
+        .light(r#"<emitter type="envmap"><string name="filename" value="sun.exr"/></emitter>"#);
+    let constant = pictures.light(r#"<emitter type="constant"/>"#);
+    for light in [gradient(&pictures), sun, constant] {
+        assert!(light.is_environment());
+        let n = 40_000;
+        let (mut drawn, mut uniform, mut strays) = (0.0, 0.0, 0);
+        for i in 0..n {
+            let sample = light.sample(Vec3::ONE, point(1, i), &()).unwrap();
+            assert!((sample.direction.length() - 1.0).abs() < 1e-5);
+            let back = light.environment_radiance(sample.direction, &());
+            assert!((back.0[0] - sample.radiance.0[0]).abs() < 1e-2 * (1.0 + back.0[0]));
+            let pdf = light.environment_pdf(sample.direction);
+            // Rounding may carry a direction at the border of a cell into the next.
+            strays += u32::from((pdf / sample.pdf - 1.0).abs() > 1e-3);
+            drawn += f64::from(sample.radiance.0[0] / sample.pdf);
+            let direction = warp::uniform_sphere(point(2, i));
+            let radiance = light.environment_radiance(direction, &());
+            assert!(radiance.is_black() || light.environment_pdf(direction) > 0.0);
+            uniform += f64::from(radiance.0[0]) * 4.0 * std::f64::consts::PI;
+        }
+        assert!(strays < n / 1000, "{strays}");
+        let ratio = drawn / uniform;
+        assert!((ratio - 1.0).abs() < 0.06, "{light:?}: {ratio}");
+    }
+}
+
+#[test]
+fn a_black_envmap_and_one_too_small_are_told_apart() {
+    let pictures = Pictures::new();
+    pictures.add("black.exr", 4, |_, _| [0.0; 3]);
+    pictures.add("slim.exr", 1, |_, _| [1.0; 3]);
+    let text = |name| {
+        format!(r#"<emitter type="envmap"><string name="filename" value="{name}"/></emitter>"#)
+    };
+    let black = pictures.light(&text("black.exr"));
+    assert!(black.sample(Vec3::ZERO, Vec2::splat(0.5), &()).is_none());
+    assert!(black.environment_radiance(Vec3::X, &()).is_black());
+    let error = pictures.try_light(&text("slim.exr")).unwrap_err();
+    assert!(error.to_string().contains("has 1 × 3"), "{error}");
+}
+
+const AIM: &str = r#"<transform name="to_world"><lookat origin="1, 2, 3" target="0, 0.5, -1" up="0, 1, 0"/></transform>"#;
+
+#[test]
+fn spots_and_projectors_throw_what_mitsuba_s_do() {
+    let pictures = Pictures::new();
+    pictures.add("slide.exr", 4, |x, y| [(x + 4 * y) as f32 / 11.0; 3]);
+    let points = [
+        [0.0, 0.5, -1.0],
+        [0.3, 0.5, -1.0],
+        [0.5, 0.0, 0.0],
+        [-1.0, 1.5, -3.0],
+        [0.0, 3.0, 4.0],
+    ];
+    let slide = r#"<string name="filename" value="slide.exr"/></texture>"#;
+    for (text, expected) in [
+        (
+            format!(
+                r#"<emitter type="spot">{AIM}<float name="cutoff_angle" value="30"/>
+                   <rgb name="intensity" value="3, 2, 1"/></emitter>"#
+            ),
+            [0.155_844_17, 0.160_085_37, 0.226_415_07, 0.074_534_16, 0.0],
+        ),
+        (
+            format!(
+                r#"<emitter type="spot">{AIM}<float name="cutoff_angle" value="30"/>
+                   <float name="beam_width" value="30"/><texture name="texture" type="bitmap">{slide}</emitter>"#
+            ),
+            [
+                0.025_974_028,
+                0.025_258_165,
+                0.019_089_729,
+                0.019_535_746,
+                0.0,
+            ],
+        ),
+        (
+            format!(
+                r#"<emitter type="projector">{AIM}<float name="fov" value="40"/><float name="scale" value="2"/>
+                   <texture name="irradiance" type="bitmap">{slide}</emitter>"#
+            ),
+            [0.163_199_6, 0.184_041_22, 0.348_368_94, 0.0, 0.0],
+        ),
+        (
+            format!(
+                r#"<emitter type="projector">{AIM}<float name="fov" value="40"/><float name="scale" value="2"/>
+                   <rgb name="irradiance" value="1"/></emitter>"#
+            ),
+            [0.326_399_2, 0.337_585_03, 0.518_727, 0.175_888_57, 0.0],
+        ),
+    ] {
+        let light = pictures.light(&text);
+        for (p, red) in points.into_iter().zip(expected) {
+            let sample = light.sample(Vec3::from_array(p), Vec2::ZERO, &());
+            let ours = sample.map_or(0.0, |s| s.radiance.0[0]);
+            assert!(
+                (ours - red).abs() <= 1e-4 * red,
+                "{text} {p:?}: {ours} {red}"
+            );
+        }
+    }
+}

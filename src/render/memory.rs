@@ -1,0 +1,201 @@
+//! What a render will take, estimated before it is taken: a refusal with a reason is better than a machine
+//! that swaps or a process that is killed. The film's share is exact; meshes are estimated by what their
+//! files announce and then known; trees go by the number of primitives.
+
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read};
+use std::path::Path;
+
+use crate::description::{Canonical, Description, Part};
+use crate::error::{Error, Result};
+use crate::sensor::Film;
+
+/// Bytes of a tree for a primitive while it is built, as measured with obvhs 0.4: boxes, sort keys, two
+/// nodes in obvhs's form and two in ours.
+const TREE: u64 = 300;
+/// Bytes of a vertex (position, normal, texture coordinates) and of a triangle.
+const VERTEX: u64 = 32;
+const TRIANGLE: u64 = 12;
+
+/// What a render takes, in bytes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Estimate {
+    /// The film's sums and the image made from them.
+    pub(super) film: u64,
+    /// Geometry and the images of textures.
+    pub(super) assets: u64,
+    pub(super) trees: u64,
+}
+
+/// The film's share for `channels` values a pixel.
+pub(super) fn film(film: &Film, channels: usize) -> u64 {
+    let pixels = u64::from(film.crop.width) * u64::from(film.crop.height);
+    let (sums, image) = (8 * (channels as u64 + 1), 4 * channels as u64);
+    // The image stands once as samples and once as the bytes of its file.
+    pixels.saturating_mul(sums + 2 * image)
+}
+
+/// The share of trees over so many primitives.
+pub(super) fn trees(primitives: u64) -> u64 {
+    primitives.saturating_mul(TREE)
+}
+
+impl Estimate {
+    /// By what the scene's files announce; the film's share is left out.
+    pub(super) fn of_files(description: &Description) -> Self {
+        let Canonical { mut files, .. } = description.canonical(Part::Scene);
+        files.sort();
+        files.dedup();
+        let mut estimate = Self::default();
+        for path in files {
+            let (assets, primitives) = of_file(&path).unwrap_or_default();
+            estimate.assets = estimate.assets.saturating_add(assets);
+            estimate.trees = estimate.trees.saturating_add(trees(primitives));
+        }
+        estimate
+    }
+
+    fn total(&self) -> u64 {
+        self.film
+            .saturating_add(self.assets)
+            .saturating_add(self.trees)
+    }
+
+    /// Refuses what exceeds the limit.
+    pub(super) fn check(&self, limit: Option<u64>) -> Result<()> {
+        let (total, Some(limit)) = (self.total(), limit) else {
+            return Ok(());
+        };
+        if total <= limit {
+            return Ok(());
+        }
+        let Self {
+            film,
+            assets,
+            trees,
+        } = *self;
+        let largest = film.max(assets).max(trees);
+        let help = if largest == film {
+            "render it in crops (--crop) or smaller (--size)"
+        } else {
+            "simplify the meshes, or place copies as instances of a shapegroup"
+        };
+        Err(Error::input(format!(
+            "this render would take about {} (film {}, meshes and images {}, trees {}), more than the limit of {}",
+            human_bytes(total),
+            human_bytes(film),
+            human_bytes(assets),
+            human_bytes(trees),
+            human_bytes(limit)
+        ))
+        .help(format!("{help}, or raise the limit (--memory-limit)")))
+    }
+}
+
+/// Bytes and primitives of a mesh or image file, as far as its head and its length tell.
+fn of_file(path: &Path) -> Option<(u64, u64)> {
+    let file = File::open(path).ok()?;
+    let length = file.metadata().ok()?.len();
+    let extension = path.extension()?.to_str()?.to_lowercase();
+    Some(match extension.as_str() {
+        "ply" => {
+            let (vertices, faces) = ply_counts(file);
+            // No vertex and no face takes less than two bytes of the file, whatever its head says.
+            let (vertices, faces) = (vertices.min(length / 2), faces.min(length / 2));
+            (vertices * VERTEX + faces * TRIANGLE, faces)
+        }
+        // A line of an OBJ file has about 30 bytes; triangles are about half of them.
+        "obj" => (length, length / 60),
+        // Compressed to about a third.
+        "serialized" => (length.saturating_mul(3), length / 20),
+        "stl" => (length, length / 50),
+        "gltf" | "glb" => (length, length / 30),
+        // Compressed to about a fifth, and held as numbers.
+        "png" | "jpg" | "jpeg" => (length.saturating_mul(20), 0),
+        _ => (length, 0),
+    })
+}
+
+/// Vertices and faces as the head of a PLY file announces them.
+fn ply_counts(file: File) -> (u64, u64) {
+    const HEAD: u64 = 1 << 16;
+    let mut counts = (0, 0);
+    for line in BufReader::new(file.take(HEAD)).split(b'\n') {
+        let Ok(line) = line else { break };
+        let line = String::from_utf8_lossy(&line);
+        let words: Vec<&str> = line.split_whitespace().collect();
+        match words[..] {
+            ["element", "vertex", n] => counts.0 = n.parse().unwrap_or(0),
+            ["element", "face", n] => counts.1 = n.parse().unwrap_or(0),
+            ["end_header"] => break,
+            _ => {}
+        }
+    }
+    counts
+}
+
+/// A number of bytes as people say it: `3.2 GB`.
+pub fn human_bytes(bytes: u64) -> String {
+    let mut value = bytes as f64;
+    for unit in ["B", "kB", "MB", "GB"] {
+        if value < 999.5 {
+            let digits = usize::from(unit != "B" && value < 99.95);
+            return format!("{value:.digits$} {unit}");
+        }
+        value /= 1000.0;
+    }
+    format!("{value:.1} TB")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_film_takes_what_its_sums_and_its_image_take() {
+        let film_of = Film::default();
+        assert_eq!(film(&film_of, 4), 768 * 576 * (5 * 8 + 2 * 4 * 4));
+    }
+
+    #[test]
+    fn what_exceeds_the_limit_is_refused_with_its_parts_and_a_remedy() {
+        let estimate = Estimate {
+            film: 3_000_000_000,
+            assets: 200_000,
+            trees: 1_500,
+        };
+        assert!(estimate.check(None).is_ok());
+        assert!(estimate.check(Some(3_000_201_500)).is_ok());
+        let error = estimate.check(Some(3_000_201_499)).unwrap_err().to_string();
+        assert!(
+            error.contains("3.0 GB (film 3.0 GB, meshes and images 200 kB, trees 1.5 kB)"),
+            "{error}"
+        );
+        assert!(error.contains("--crop"), "{error}");
+    }
+
+    #[test]
+    fn a_head_that_promises_too_much_is_not_believed() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.ply");
+        let head =
+            "ply\nformat ascii 1.0\nelement vertex 3\nelement face 99999999999999\nend_header\n";
+        std::fs::write(&path, head).unwrap();
+        let (bytes, primitives) = of_file(&path).unwrap();
+        assert_eq!(primitives, head.len() as u64 / 2);
+        assert!(bytes < 1000);
+    }
+
+    #[test]
+    fn bytes_are_said_in_three_digits() {
+        for (bytes, said) in [
+            (0, "0 B"),
+            (999, "999 B"),
+            (1000, "1.0 kB"),
+            (123_456_789, "123 MB"),
+            (8_000_000_000, "8.0 GB"),
+        ] {
+            assert_eq!(human_bytes(bytes), said);
+        }
+    }
+}

@@ -1,0 +1,209 @@
+//! Renders that follow one another. A session keeps the threads and the last scene, so that frames and
+//! sensors that look at the same meshes have them loaded and their trees built once; a scene that is
+//! another takes the place of the one before, so that one is in memory at a time.
+
+use std::num::NonZeroUsize;
+
+use rayon::ThreadPool;
+
+use super::checkpoint::Keeper;
+use super::options::{Colors, Options};
+use super::plan::Plan;
+use super::prepare::{self, Job, Kept};
+use super::progress::Progress;
+use super::sums::Sums;
+use super::unit::{self, Summed};
+use super::{Rendered, Seconds, timed};
+use crate::color::{Bands, ColorModel, Rgb};
+use crate::description::Description;
+use crate::error::{Error, Result};
+use crate::shape::Bounds;
+
+/// Renders that follow one another; see the module.
+#[derive(Debug, Default)]
+pub struct Session {
+    pool: Option<Pool>,
+    kept: Option<Kept>,
+}
+
+#[derive(Debug)]
+struct Pool {
+    asked: Option<NonZeroUsize>,
+    threads: ThreadPool,
+}
+
+/// Something to be done in a colour model. This is where the model is chosen, once and for all that is
+/// below.
+pub(super) trait Task: Sized {
+    /// What comes of it.
+    type Output;
+
+    /// Does it.
+    fn run<C: ColorModel>(self, color: C) -> Result<Self::Output>;
+
+    /// Does it in the model that is asked for.
+    fn run_in(self, colors: Colors) -> Result<Self::Output> {
+        match colors {
+            Colors::Rgb => self.run(Rgb),
+            Colors::Bands(n @ 1..=8) => self.run(bands::<8>(n)?),
+            Colors::Bands(n @ 9..=16) => self.run(bands::<16>(n)?),
+            Colors::Bands(n) => self.run(bands::<32>(n)?),
+        }
+    }
+}
+
+fn bands<const N: usize>(count: usize) -> Result<Bands<N>> {
+    Bands::new(count).ok_or_else(|| Error::input(format!("{count} bands; 1 to 32 are possible")))
+}
+
+/// What every task of a session is about.
+struct Ask<'a> {
+    kept: &'a mut Option<Kept>,
+    description: &'a Description,
+    options: &'a Options,
+    progress: &'a dyn Progress,
+}
+
+/// Makes sure that the scene is in memory and tells its box.
+struct Measure<'a>(Ask<'a>);
+
+impl Task for Measure<'_> {
+    type Output = Bounds;
+
+    fn run<C: ColorModel>(self, color: C) -> Result<Bounds> {
+        let Ask {
+            kept,
+            description,
+            options,
+            progress,
+        } = self.0;
+        let mut seconds = Seconds::default();
+        let job = prepare::prepare(kept, description, options, color, progress, &mut seconds)?;
+        Ok(job.facts.bounds)
+    }
+}
+
+/// Makes the image.
+struct Render<'a>(Ask<'a>);
+
+impl Task for Render<'_> {
+    type Output = Rendered;
+
+    fn run<C: ColorModel>(self, color: C) -> Result<Rendered> {
+        let Ask {
+            kept,
+            description,
+            options,
+            progress,
+        } = self.0;
+        let mut seconds = Seconds::default();
+        let job = prepare::prepare(kept, description, options, color, progress, &mut seconds)?;
+        let plan = Plan::new(&job.view.film, job.view.sampler.sample_count());
+        let mut summed = Summed {
+            sums: Sums::try_new(job.view.film.crop, job.channels())?,
+            next: 0,
+        };
+        let mut keeper = None;
+        if let Some(checkpoint) = &options.checkpoint {
+            let fingerprint = Job::<C>::fingerprint(description, options)?;
+            let keeper = keeper.insert(Keeper::new(checkpoint.clone(), fingerprint));
+            keeper.resume(&mut summed, plan.units())?;
+        }
+        let summed = timed(&mut seconds.render, || {
+            unit::run(&job, &plan, summed, progress, keeper.as_mut())
+        });
+        let completed = plan.completed(summed.next);
+        let mut warnings = job.warnings.clone();
+        if let Some(keeper) = &mut keeper {
+            seconds.render = keeper.seconds();
+            keeper.finish(&summed, completed.is_whole());
+            warnings.extend(keeper.warning());
+        }
+        let Summed { sums, .. } = summed;
+        let mut report = job.report(completed, seconds);
+        report.stats = sums.stats;
+        report.dropped_samples = sums.dropped;
+        report.dropped_pixel = sums.dropped_pixel;
+        warnings.extend(sums.warning());
+        Ok(Rendered {
+            image: sums.develop(&job.view.film)?,
+            window: job.window(),
+            metadata: job.metadata(&options.scene, &report),
+            report,
+            warnings,
+        })
+    }
+}
+
+impl Session {
+    /// Renders what `description` says. `description` has the options' overrides already: see
+    /// [`Overrides::apply`](super::Overrides::apply). A render that was stopped is no error: the report
+    /// says what is complete.
+    ///
+    /// # Errors
+    /// Names everything that is wrong with the scene, unread properties included; and a checkpoint that
+    /// cannot be continued, or a lack of memory.
+    pub fn render(
+        &mut self,
+        description: &Description,
+        options: &Options,
+        progress: &dyn Progress,
+    ) -> Result<Rendered> {
+        self.run(options, |kept| {
+            let ask = Ask {
+                kept,
+                description,
+                options,
+                progress,
+            };
+            Render(ask).run_in(options.colors)
+        })
+    }
+
+    /// The box around the scene, which is in memory then for the next render.
+    ///
+    /// # Errors
+    /// As [`Session::render`].
+    pub fn bounds(
+        &mut self,
+        description: &Description,
+        options: &Options,
+        progress: &dyn Progress,
+    ) -> Result<Bounds> {
+        self.run(options, |kept| {
+            let ask = Ask {
+                kept,
+                description,
+                options,
+                progress,
+            };
+            Measure(ask).run_in(options.colors)
+        })
+    }
+
+    /// Does `work` on the threads that the options ask for.
+    fn run<T: Send>(
+        &mut self,
+        options: &Options,
+        work: impl FnOnce(&mut Option<Kept>) -> Result<T> + Send,
+    ) -> Result<T> {
+        let kept = &mut self.kept;
+        let pool = match &mut self.pool {
+            Some(pool) if pool.asked == options.threads => pool,
+            pool => pool.insert(Pool {
+                asked: options.threads,
+                threads: start(options.threads)?,
+            }),
+        };
+        pool.threads.install(|| work(kept))
+    }
+}
+
+/// Starts so many threads, one a processor where that is open.
+pub(super) fn start(threads: Option<NonZeroUsize>) -> Result<ThreadPool> {
+    let threads = threads.map_or(0, NonZeroUsize::get);
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .map_err(|e| Error::input(format!("cannot start {threads} threads: {e}")))
+}

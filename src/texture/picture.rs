@@ -1,0 +1,57 @@
+//! An image file as linear BT.709 texels, for the plugins that look into one: 8- and 16-bit files are decoded
+//! from sRGB unless they hold plain numbers, values that are not finite count as 0, alpha is dropped.
+
+use std::path::Path;
+
+use crate::color::srgb;
+use crate::error::{Error, Location, Result};
+use crate::image::{self, Encoding, Image, Limits};
+
+/// The colours of an image file.
+#[derive(Debug)]
+pub struct Picture {
+    image: Image,
+    /// Where red, green and blue stand among the channels.
+    rgb: [usize; 3],
+    encoded: bool,
+}
+
+impl Picture {
+    /// Reads the file; `raw` says that it holds plain numbers.
+    ///
+    /// # Errors
+    /// Where the file cannot be read or holds no colours.
+    pub fn read(path: &Path, raw: bool) -> Result<Self> {
+        let picture = image::read(path, &Limits::default())?;
+        let Some(rgb) = picture.image.rgb() else {
+            let message = format!("no colour channels among {:?}", picture.image.channels());
+            return Err(Error::input(message).at(&Location::of_file(path)));
+        };
+        Ok(Self {
+            image: picture.image,
+            rgb,
+            encoded: picture.encoding != Encoding::Linear && !raw,
+        })
+    }
+
+    /// Columns and rows.
+    pub fn size(&self) -> [usize; 2] {
+        [self.image.width() as usize, self.image.height() as usize]
+    }
+
+    /// All texels, row by row from the top.
+    pub fn texels(&self) -> impl Iterator<Item = [f32; 3]> {
+        let (width, height) = (self.image.width(), self.image.height());
+        let texel = |x, y| self.rgb.map(|c| self.decode(self.image.get(x, y, c)));
+        (0..height).flat_map(move |y| (0..width).map(move |x| texel(x, y)))
+    }
+
+    fn decode(&self, value: f32) -> f32 {
+        let value = if self.encoded {
+            srgb::decode(value)
+        } else {
+            value
+        };
+        if value.is_finite() { value } else { 0.0 }
+    }
+}

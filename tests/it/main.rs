@@ -1,0 +1,11 @@
+//! The integration tests: one binary, a module a question. The images are rendered in earnest, so run them
+//! with `--release`.
+
+mod support;
+
+mod closed_form;
+mod golden;
+mod inputs;
+mod layers;
+mod mitsuba_data;
+mod same_bits;
