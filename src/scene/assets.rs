@@ -60,7 +60,7 @@ impl Assets {
                 shape
             })
             .collect();
-        let mut warnings = Vec::new();
+        let mut warnings: Vec<Problem> = media(&shapes).into_iter().collect();
         let mut members = Vec::with_capacity(shapes.len());
         for ((properties, group), result) in shapes.iter().zip(results) {
             if let Some(shape) = problems.take(result) {
@@ -95,6 +95,20 @@ impl Assets {
     pub fn bytes(&self) -> usize {
         self.shapes.iter().map(|s| s.geometry.bytes()).sum()
     }
+}
+
+/// The warning for participating media, which shapes may enclose and Étendue does not render.
+fn media(shapes: &[(Properties<'_>, u32)]) -> Option<Problem> {
+    let media: Vec<_> = shapes
+        .iter()
+        .flat_map(|(shape, _)| shape.children(Kind::Medium))
+        .collect();
+    let message = format!(
+        "participating media are not rendered: {} shapes count as empty",
+        media.len()
+    );
+    let warning = Error::unsupported(message).at(media.first()?.location());
+    warning.problems().first().cloned()
 }
 
 /// What is to be loaded.
