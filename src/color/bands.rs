@@ -188,6 +188,16 @@ impl<const N: usize> ColorModel for Bands<N> {
         }))
     }
 
+    fn luminance(&self, sample: &Samples<N>, wavelengths: &[f32; N]) -> f32 {
+        let (mut sum, mut white) = (0.0, 0.0);
+        for i in 0..self.count {
+            let weight = cie::xyz(wavelengths[i])[1];
+            sum += weight * sample[i];
+            white += weight;
+        }
+        if white > 0.0 { sum / white } else { 0.0 }
+    }
+
     fn channels(&self) -> Vec<String> {
         let width = self.width();
         let edge = |i: usize| cie::FIRST + i as f32 * width;

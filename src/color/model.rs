@@ -56,6 +56,9 @@ pub trait ColorModel: Clone + std::fmt::Debug + Send + Sync + 'static {
     /// A texel at a path's wavelengths.
     fn evaluate_texel(texel: &Self::Texel, wavelengths: &Self::Wavelengths) -> Self::Sample;
 
+    /// The luminance of a reflectance: 1 for white.
+    fn luminance(&self, sample: &Self::Sample, wavelengths: &Self::Wavelengths) -> f32;
+
     /// The channels of an image: `R`, `G`, `B`, and one a band.
     fn channels(&self) -> Vec<String>;
     /// Writes a sample's value for each of [`Self::channels`] to the start of `out`.

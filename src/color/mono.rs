@@ -48,6 +48,10 @@ impl ColorModel for Mono {
         Samples([*texel])
     }
 
+    fn luminance(&self, sample: &Samples<1>, _wavelengths: &()) -> f32 {
+        sample.0[0]
+    }
+
     fn channels(&self) -> Vec<String> {
         vec!["Y".into()]
     }

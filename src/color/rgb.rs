@@ -3,7 +3,7 @@
 
 use super::cie;
 use super::d65::d65;
-use super::model::{Color, ColorModel, Role, xyz_to_rgb};
+use super::model::{Color, ColorModel, Role, luminance, xyz_to_rgb};
 use super::samples::Samples;
 
 /// The RGB colour model.
@@ -62,6 +62,10 @@ impl ColorModel for Rgb {
     #[inline]
     fn evaluate_texel(texel: &[f32; 3], _wavelengths: &()) -> Samples<3> {
         Samples(*texel)
+    }
+
+    fn luminance(&self, sample: &Samples<3>, _wavelengths: &()) -> f32 {
+        luminance(sample.0)
     }
 
     fn channels(&self) -> Vec<String> {

@@ -9,11 +9,18 @@ mod diffuse;
 mod mask;
 mod null;
 mod plastic;
+mod principled;
+mod principledthin;
+mod roughconductor;
+mod roughdielectric;
+mod roughplastic;
 mod thindielectric;
 mod twosided;
 
+mod disney;
 mod fresnel;
 mod ior;
+mod microfacet;
 
 use glam::{Vec2, Vec3};
 
@@ -144,6 +151,11 @@ family! {
         "mask" => Mask(mask::Mask<C>),
         "null" => Null(null::Null),
         "plastic" => Plastic(plastic::Plastic<C>),
+        "principled" => Principled(principled::Principled<C>),
+        "principledthin" => PrincipledThin(principledthin::PrincipledThin<C>),
+        "roughconductor" => RoughConductor(roughconductor::RoughConductor<C>),
+        "roughdielectric" => RoughDielectric(roughdielectric::RoughDielectric<C>),
+        "roughplastic" => RoughPlastic(roughplastic::RoughPlastic<C>),
         "thindielectric" => ThinDielectric(thindielectric::ThinDielectric<C>),
         "twosided" => TwoSided(twosided::TwoSided<C>),
     }

@@ -38,6 +38,56 @@ const MATERIALS: &[(&str, &str)] = &[
         "plastic",
         r#"<bsdf type="plastic"><boolean name="nonlinear" value="true"/><float name="int_ior" value="1.9"/><rgb name="diffuse_reflectance" value="1, 0.27, 0.36"/></bsdf>"#,
     ),
+    ("principled", r#"<bsdf type="principled"/>"#),
+    (
+        "principled",
+        r#"<bsdf type="principled"><rgb name="base_color" value="0.8, 0.3, 0.1"/><float name="metallic" value="0.6"/><float name="anisotropic" value="0.7"/><float name="clearcoat" value="1"/><float name="spec_tint" value="0.5"/><float name="flatness" value="0.5"/></bsdf>"#,
+    ),
+    (
+        "principled",
+        r#"<bsdf type="principled"><rgb name="base_color" value="0.8, 0.9, 1"/><float name="spec_trans" value="0.8"/><float name="sheen" value="0.3"/><float name="sheen_tint" value="0.5"/><float name="eta" value="1.6"/></bsdf>"#,
+    ),
+    (
+        "principledthin",
+        r#"<bsdf type="principledthin"><float name="spec_trans" value="0.5"/><float name="diff_trans" value="0.8"/><float name="spec_tint" value="0.5"/><float name="sheen" value="0.2"/></bsdf>"#,
+    ),
+    ("principledthin", r#"<bsdf type="principledthin"/>"#),
+    (
+        "roughconductor",
+        r#"<bsdf type="roughconductor"><string name="material" value="Au"/></bsdf>"#,
+    ),
+    (
+        "roughconductor",
+        r#"<bsdf type="roughconductor"><string name="distribution" value="ggx"/><float name="alpha_u" value="0.6"/><float name="alpha_v" value="0.2"/></bsdf>"#,
+    ),
+    (
+        "roughconductor",
+        r#"<bsdf type="roughconductor"><boolean name="sample_visible" value="false"/><float name="alpha_u" value="0.3"/><float name="alpha_v" value="0.5"/></bsdf>"#,
+    ),
+    (
+        "roughconductor",
+        r#"<bsdf type="roughconductor"><string name="distribution" value="ggx"/><float name="alpha" value="0.05"/></bsdf>"#,
+    ),
+    (
+        "roughdielectric",
+        r#"<bsdf type="roughdielectric"><float name="alpha" value="0.5"/></bsdf>"#,
+    ),
+    (
+        "roughdielectric",
+        r#"<bsdf type="roughdielectric"><string name="distribution" value="ggx"/><float name="alpha_u" value="0.4"/><float name="alpha_v" value="0.2"/><float name="int_ior" value="2"/></bsdf>"#,
+    ),
+    (
+        "roughdielectric",
+        r#"<bsdf type="roughdielectric"><boolean name="sample_visible" value="false"/><float name="alpha" value="0.3"/></bsdf>"#,
+    ),
+    (
+        "roughplastic",
+        r#"<bsdf type="roughplastic"><float name="alpha" value="0.3"/></bsdf>"#,
+    ),
+    (
+        "roughplastic",
+        r#"<bsdf type="roughplastic"><string name="distribution" value="ggx"/><boolean name="nonlinear" value="true"/><rgb name="diffuse_reflectance" value="1, 0.2, 0"/></bsdf>"#,
+    ),
     ("thindielectric", r#"<bsdf type="thindielectric"/>"#),
     (
         "twosided",

@@ -3,8 +3,10 @@
 //! keeps a ray from hitting the surface it leaves.
 
 pub mod distribution;
+pub mod erf;
 pub mod frame;
 pub mod offset;
+pub mod quadrature;
 pub mod random;
 pub mod transform;
 pub mod warp;

@@ -1,0 +1,360 @@
+//! Microfacet distributions: how the normals of a rough surface's facets spread, for models that
+//! reflect or refract at them (Walter et al., *Microfacet models for refraction through rough surfaces*,
+//! 2007). Beckmann's is that of a Gaussian height field, GGX has longer tails; both may be stretched
+//! along the tangents. Facets are drawn as they are seen from `wi` (Heitz and d'Eon, *Importance sampling
+//! microfacet-based BSDFs using the distribution of visible normals*, 2014; GGX by Heitz, *A simpler and
+//! exact sampling routine*, 2017; Beckmann by Jakob, *An improved visible normal sampling routine*, 2014)
+//! or by their area alone.
+
+use std::f32::consts::{FRAC_1_PI, PI, TAU};
+
+use glam::{Vec2, Vec3};
+
+use crate::color::Mono;
+use crate::description::Properties;
+use crate::error::Result;
+use crate::interaction::Interaction;
+use crate::math::erf::{erf, erf_inverse};
+use crate::math::warp;
+use crate::texture::{Palette, Texture};
+
+/// Which distribution.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Shape {
+    /// Of a Gaussian height field.
+    Beckmann,
+    /// Trowbridge and Reitz's, long-tailed.
+    Ggx,
+}
+
+/// The properties `distribution` (beckmann or ggx) and `sample_visible` (true).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Kind {
+    pub(super) shape: Shape,
+    pub(super) sample_visible: bool,
+}
+
+impl Kind {
+    pub(super) fn build(properties: &Properties<'_>) -> Result<Self> {
+        let name = properties.string("distribution")?.unwrap_or("beckmann");
+        let shape = match name.to_lowercase().as_str() {
+            "beckmann" => Shape::Beckmann,
+            "ggx" => Shape::Ggx,
+            _ => {
+                let message = format!("unknown distribution \"{name}\"");
+                let error = properties.error("distribution", message);
+                return Err(error.help("there are beckmann and ggx"));
+            }
+        };
+        Ok(Self {
+            shape,
+            sample_visible: properties.boolean("sample_visible")?.unwrap_or(true),
+        })
+    }
+}
+
+/// A distribution whose roughness varies over the surface: `alpha` (0.1), or `alpha_u` and `alpha_v`.
+#[derive(Clone, Debug)]
+pub(super) struct Roughness {
+    kind: Kind,
+    alpha_u: Texture<Mono>,
+    /// The same as `alpha_u` where absent.
+    alpha_v: Option<Texture<Mono>>,
+}
+
+impl Roughness {
+    pub(super) fn build(properties: &Properties<'_>, numbers: &Palette<Mono>) -> Result<Self> {
+        let kind = Kind::build(properties)?;
+        let stretched = properties.has("alpha_u") || properties.has("alpha_v");
+        if stretched && properties.has("alpha") {
+            return Err(properties.error("alpha", "give either alpha, or alpha_u and alpha_v"));
+        }
+        if stretched && !(properties.has("alpha_u") && properties.has("alpha_v")) {
+            return Err(properties.error("", "alpha_u and alpha_v come together"));
+        }
+        let name = if stretched { "alpha_u" } else { "alpha" };
+        let alpha_u = numbers.number(properties, name, DEFAULT_ALPHA)?;
+        let alpha_v = stretched
+            .then(|| numbers.number(properties, "alpha_v", DEFAULT_ALPHA))
+            .transpose()?;
+        Ok(Self {
+            kind,
+            alpha_u,
+            alpha_v,
+        })
+    }
+
+    pub(super) fn at(&self, at: &Interaction<'_>) -> Distribution {
+        let u = self.alpha_u.eval(at, &())[0];
+        let v = self.alpha_v.as_ref().map_or(u, |v| v.eval(at, &())[0]);
+        Distribution::new(self.kind, u, v)
+    }
+}
+
+/// Roughness where a scene gives none.
+pub(super) const DEFAULT_ALPHA: f64 = 0.1;
+
+/// The distribution at one point.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Distribution {
+    kind: Kind,
+    alpha: Vec2,
+}
+
+impl Distribution {
+    /// Roughness along the tangents, at least 10⁻⁴ each.
+    pub(super) fn new(kind: Kind, alpha_u: f32, alpha_v: f32) -> Self {
+        Self {
+            kind,
+            alpha: Vec2::new(alpha_u, alpha_v).max(Vec2::splat(1e-4)),
+        }
+    }
+
+    /// The same with its roughness multiplied.
+    #[must_use]
+    pub(super) fn scaled(self, factor: f32) -> Self {
+        Self {
+            alpha: self.alpha * factor,
+            ..self
+        }
+    }
+
+    /// Whether facets are drawn as they are seen.
+    pub(super) fn samples_visible(&self) -> bool {
+        self.kind.sample_visible
+    }
+
+    /// D(m): facet area per solid angle of normals and unit of surface.
+    pub(super) fn eval(&self, m: Vec3) -> f32 {
+        let slope2 = (m.truncate() / self.alpha).length_squared();
+        let scale = FRAC_1_PI / (self.alpha.x * self.alpha.y);
+        let cos2 = m.z * m.z;
+        let d = match self.kind.shape {
+            Shape::Beckmann => scale * (-slope2 / cos2).exp() / (cos2 * cos2),
+            Shape::Ggx => scale / (slope2 + cos2).powi(2),
+        };
+        // Also false for NaN: facets on edge, of which there are none.
+        if d * m.z > 1e-20 { d } else { 0.0 }
+    }
+
+    /// Smith's masking: the share of facets with normal `m` that `v` sees.
+    pub(super) fn g1(&self, v: Vec3, m: Vec3) -> f32 {
+        if v.dot(m) * v.z <= 0.0 {
+            return 0.0; // the back of a facet is not seen from the front
+        }
+        let xy2 = (v.truncate() * self.alpha).length_squared();
+        if xy2 == 0.0 {
+            return 1.0;
+        }
+        let tan2 = xy2 / (v.z * v.z);
+        match self.kind.shape {
+            Shape::Beckmann => {
+                let a = 1.0 / tan2.sqrt();
+                if a >= 1.6 {
+                    1.0
+                } else {
+                    // Walter's rational fit, within 0.35 %.
+                    (3.535 * a + 2.181 * a * a) / (1.0 + 2.276 * a + 2.577 * a * a)
+                }
+            }
+            Shape::Ggx => 2.0 / (1.0 + (1.0 + tan2).sqrt()),
+        }
+    }
+
+    /// The share of facets seen from both.
+    pub(super) fn g(&self, wi: Vec3, wo: Vec3, m: Vec3) -> f32 {
+        self.g1(wi, m) * self.g1(wo, m)
+    }
+
+    /// The density of [`Self::sample`]; `wi` is on the front side.
+    pub(super) fn pdf(&self, wi: Vec3, m: Vec3) -> f32 {
+        let d = self.eval(m);
+        if self.kind.sample_visible {
+            d * self.g1(wi, m) * wi.dot(m).abs() / wi.z
+        } else {
+            d * m.z
+        }
+    }
+
+    /// Draws the normal, on the front side, of a facet for `wi`, which is there too.
+    pub(super) fn sample(&self, wi: Vec3, u: Vec2) -> Vec3 {
+        if self.kind.sample_visible {
+            self.visible(wi, u)
+        } else {
+            self.any(u)
+        }
+    }
+
+    /// A facet by its area projected on the surface.
+    fn any(&self, u: Vec2) -> Vec3 {
+        // tan² θ for roughness 1, then stretched.
+        let tan2 = match self.kind.shape {
+            Shape::Beckmann => -(1.0 - u.x).ln(),
+            Shape::Ggx => u.x / (1.0 - u.x),
+        };
+        let (sin, cos) = (TAU * u.y).sin_cos();
+        let slope = tan2.sqrt() * self.alpha * Vec2::new(cos, sin);
+        slope.extend(1.0).normalize()
+    }
+
+    /// A facet by its area projected on `wi`: stretched so that the roughness is 1, drawn there, and
+    /// stretched back.
+    fn visible(&self, wi: Vec3, u: Vec2) -> Vec3 {
+        let stretched = (wi.truncate() * self.alpha).extend(wi.z).normalize();
+        let sin2 = stretched.truncate().length_squared();
+        let turn = if sin2 > 1e-14 {
+            stretched.truncate() / sin2.sqrt()
+        } else {
+            Vec2::X
+        };
+        let slope = match self.kind.shape {
+            Shape::Beckmann => beckmann_slope(stretched.z, u),
+            Shape::Ggx => ggx_slope(stretched.z, u),
+        };
+        let slope = turn.rotate(slope) * self.alpha;
+        Vec3::new(-slope.x, -slope.y, 1.0).normalize()
+    }
+}
+
+/// A slope seen at the angle with that cosine in the plane x = 0, of Beckmann's distribution with
+/// roughness 1: the inverse of the cumulative distribution, in the domain of erf, by Newton's method.
+fn beckmann_slope(cos: f32, u: Vec2) -> Vec2 {
+    let tan = (1.0 - cos * cos).max(0.0).sqrt() / cos;
+    let cot = 1.0 / tan;
+    let limit = erf(cot);
+    let u = u.clamp(Vec2::splat(1e-6), Vec2::splat(1.0 - 1e-6));
+    // Exact at grazing incidence, where the function is least linear.
+    let mut x = limit - (limit + 1.0) * erf((-u.x.ln()).sqrt());
+    let root = 1.0 / PI.sqrt();
+    let target = u.x * (1.0 + limit + root * tan * (-cot * cot).exp());
+    for _ in 0..3 {
+        let slope = erf_inverse(x);
+        let value = 1.0 + x + root * tan * (-slope * slope).exp() - target;
+        x -= value / (1.0 - slope * tan);
+    }
+    Vec2::new(erf_inverse(x), erf_inverse(2.0 * u.y - 1.0))
+}
+
+/// The same of GGX: a point on the facets' hemisphere, projected along the view on a disc.
+fn ggx_slope(cos: f32, u: Vec2) -> Vec2 {
+    let p = warp::concentric_disk(u);
+    let s = 0.5 * (1.0 + cos);
+    let edge = (1.0 - p.x * p.x).max(0.0).sqrt();
+    let y = edge + (p.y - edge) * s;
+    let z = (1.0 - p.x * p.x - y * y).max(0.0).sqrt();
+    let sin = (1.0 - cos * cos).max(0.0).sqrt();
+    Vec2::new(cos * y - sin * z, p.x) / (sin * y + cos * z)
+}
+
+/// Two directions and the facet that would take light from one to the other.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Interface {
+    /// Its normal, on the front side.
+    pub(super) m: Vec3,
+    /// Whether both directions are on the same side.
+    pub(super) reflection: bool,
+    /// Index of refraction on the side of `wo` over that on the side of `wi`.
+    pub(super) eta: f32,
+    /// Solid angle of normals for each of `wo`.
+    pub(super) jacobian: f32,
+}
+
+impl Interface {
+    /// Of a boundary whose index is `eta` inside over outside; `None` where no facet seen from both does
+    /// it.
+    pub(super) fn between(wi: Vec3, wo: Vec3, eta: f32) -> Option<Self> {
+        let reflection = wi.z * wo.z > 0.0;
+        let eta = match (reflection, wi.z > 0.0) {
+            (true, _) => 1.0,
+            (false, true) => eta,
+            (false, false) => 1.0 / eta,
+        };
+        let half = (wi + wo * eta).normalize_or_zero();
+        let m = if half.z < 0.0 { -half } else { half };
+        let (cos_i, cos_o) = (wi.dot(m), wo.dot(m));
+        let seen = cos_i * wi.z > 0.0 && cos_o * wo.z > 0.0;
+        let jacobian = if reflection {
+            0.25 / cos_o.abs()
+        } else {
+            eta * eta * cos_o.abs() / (cos_i + eta * cos_o).powi(2)
+        };
+        (seen && jacobian.is_finite()).then_some(Self {
+            m,
+            reflection,
+            eta,
+            jacobian,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn distributions() -> impl Iterator<Item = Distribution> {
+        [Shape::Beckmann, Shape::Ggx].into_iter().flat_map(|shape| {
+            [(0.1, 0.1), (0.5, 0.2), (1.0, 1.0)]
+                .into_iter()
+                .flat_map(move |(u, v)| {
+                    [true, false].map(|sample_visible| {
+                        let kind = Kind {
+                            shape,
+                            sample_visible,
+                        };
+                        Distribution::new(kind, u, v)
+                    })
+                })
+        })
+    }
+
+    /// The integral of `f` over the normals of the front, by a fine grid in cos θ and φ.
+    fn integral(f: impl Fn(Vec3) -> f32) -> f64 {
+        let n = 1000;
+        let mut sum = 0.0;
+        for i in 0..n {
+            for j in 0..n {
+                // Denser near the pole, where smooth surfaces have their facets.
+                let x = (i as f32 + 0.5) / n as f32;
+                let cos = 1.0 - x * x;
+                let sin = (1.0 - cos * cos).sqrt();
+                let (s, c) = (TAU * (j as f32 + 0.5) / n as f32).sin_cos();
+                sum += f64::from(f(Vec3::new(sin * c, sin * s, cos)) * 2.0 * x);
+            }
+        }
+        sum * std::f64::consts::TAU / f64::from(n * n)
+    }
+
+    #[test]
+    fn facets_cover_the_surface_and_densities_integrate_to_one() {
+        let wi = Vec3::new(0.6, -0.36, 0.714_142_84);
+        for d in distributions() {
+            let area = integral(|m| d.eval(m) * m.z);
+            assert!((area - 1.0).abs() < 2e-3, "{d:?}: {area}");
+            let pdf = integral(|m| d.pdf(wi, m));
+            // Beckmann's masking is a fit.
+            assert!((pdf - 1.0).abs() < 5e-3, "{d:?}: {pdf}");
+            let seen = integral(|m| d.eval(m) * d.g1(wi, m) * wi.dot(m).max(0.0));
+            assert!((seen / f64::from(wi.z) - 1.0).abs() < 5e-3, "{d:?}: {seen}");
+        }
+    }
+
+    #[test]
+    fn drawn_facets_have_the_slopes_of_their_density() {
+        let wi = Vec3::new(0.6, -0.36, 0.714_142_84);
+        for d in distributions() {
+            // cos θ, for slopes of long-tailed distributions have no finite variance.
+            for f in [|m: Vec3| m.z, |m: Vec3| m.x, |m: Vec3| m.y * m.y] {
+                let expected = integral(|m| f(m) * d.pdf(wi, m));
+                let n = 300;
+                let mut mean = 0.0;
+                for i in 0..n * n {
+                    let u = Vec2::new((i / n) as f32 + 0.5, (i % n) as f32 + 0.5) / n as f32;
+                    let m = d.sample(wi, u);
+                    assert!(m.is_normalized() && m.z > 0.0);
+                    mean += f64::from(f(m)) / f64::from(n * n);
+                }
+                assert!((mean - expected).abs() < 4e-3, "{d:?}: {mean} {expected}");
+            }
+        }
+    }
+}

@@ -1,0 +1,171 @@
+//! `roughplastic`: a matte base under a clear, rough coat. As `plastic`, with the coat's reflection that
+//! of microfacets and its transmittance averaged over them, tabulated by the cosine of incidence when the
+//! scene is built. `distribution` beckmann or ggx; `alpha` (0.1) is a number.
+
+use std::sync::Arc;
+
+use glam::{Vec2, Vec3};
+use rayon::prelude::*;
+
+use super::microfacet::{DEFAULT_ALPHA, Distribution, Kind};
+use super::plastic::{Base, coat_probability};
+use super::{Bsdf, BsdfSample, BsdfValue, Lobes, fresnel, ior};
+use crate::color::{Color, ColorModel, Role};
+use crate::description::Properties;
+use crate::error::Result;
+use crate::interaction::Interaction;
+use crate::math::{quadrature, warp};
+use crate::texture::{Palettes, Texture};
+
+/// A matte base under a rough coat.
+#[derive(Clone, Debug)]
+pub struct RoughPlastic<C: ColorModel> {
+    base: Base<C>,
+    distribution: Distribution,
+    /// The share of light that passes the coat from outside, at equal steps of the cosine from 0 to 1.
+    transmittance: Arc<[f32]>,
+    specular_reflectance: Texture<C>,
+    specular_weight: f32,
+}
+
+/// Cosines in the table.
+const STEPS: usize = 64;
+
+/// The cosine of entry `i` of the table; the first is not quite 0.
+fn cosine(i: usize) -> f32 {
+    (i as f32 / (STEPS - 1) as f32).max(1e-6)
+}
+
+impl<C: ColorModel> RoughPlastic<C> {
+    pub(super) fn build(properties: &Properties<'_>, palettes: &Palettes<C>) -> Result<Self> {
+        let eta = ior::relative_and_different(properties, "polypropylene")?;
+        let kind = Kind::build(properties)?;
+        let alpha = properties.float("alpha")?.unwrap_or(DEFAULT_ALPHA) as f32;
+        let visible = Kind {
+            sample_visible: true,
+            ..kind
+        };
+        let facets = Distribution::new(visible, alpha, alpha);
+        let table = |f: fn(&Distribution, f32, f32) -> f32, eta| -> Vec<f32> {
+            let cosines = (0..STEPS).into_par_iter().map(cosine);
+            cosines.map(|cos| f(&facets, cos, eta)).collect()
+        };
+        let inside = table(reflectance, 1.0 / eta);
+        let internal: f32 = inside.iter().enumerate().map(|(i, r)| cosine(i) * r).sum();
+        let base = Base::build(properties, palettes, eta, internal * 2.0 / STEPS as f32)?;
+        let specular_reflectance = palettes.colors.texture(
+            properties,
+            "specular_reflectance",
+            Role::Reflectance,
+            Color::Grey(1.0),
+        )?;
+        Ok(Self {
+            distribution: Distribution::new(kind, alpha, alpha),
+            transmittance: table(transmittance, eta).into(),
+            specular_weight: base.specular_weight(palettes, &specular_reflectance),
+            base,
+            specular_reflectance,
+        })
+    }
+
+    /// The share of light that passes the coat at the cosine `cos` ≥ 0.
+    fn passes(&self, cos: f32) -> f32 {
+        let x = cos * (STEPS - 1) as f32;
+        let i = (x as usize).min(STEPS - 2);
+        let f = x - i as f32;
+        self.transmittance[i] * (1.0 - f) + self.transmittance[i + 1] * f
+    }
+}
+
+/// The mean of `f`(wi, facet) over the facets that are seen at the cosine `cos`.
+fn mean_over_facets(
+    facets: &Distribution,
+    cos: f32,
+    eta: f32,
+    f: impl Fn(Vec3, Vec3) -> f32,
+) -> f32 {
+    let wi = Vec3::new((1.0 - cos * cos).max(0.0).sqrt(), 0.0, cos);
+    // Total reflection makes a step in the integrand.
+    let rule = quadrature::gauss_legendre(if eta > 1.0 { 32 } else { 64 });
+    let mut sum = 0.0;
+    for (x, wx) in &rule {
+        for (y, wy) in &rule {
+            let m = facets.sample(wi, Vec2::new(*x as f32, *y as f32));
+            sum += wx * wy * f64::from(f(wi, m));
+        }
+    }
+    sum as f32
+}
+
+/// The share of light that a rough boundary reflects.
+fn reflectance(facets: &Distribution, cos: f32, eta: f32) -> f32 {
+    mean_over_facets(facets, cos, eta, |wi, m| {
+        let wo = fresnel::reflect(wi, m);
+        if wo.z <= 0.0 {
+            return 0.0;
+        }
+        facets.g1(wo, m) * fresnel::dielectric(wi.dot(m), eta).reflectance
+    })
+}
+
+/// The share of light that passes a rough boundary.
+fn transmittance(facets: &Distribution, cos: f32, eta: f32) -> f32 {
+    mean_over_facets(facets, cos, eta, |wi, m| {
+        let boundary = fresnel::dielectric(wi.dot(m), eta);
+        let wo = fresnel::refract(wi, m, &boundary);
+        if wo.z >= 0.0 {
+            return 0.0;
+        }
+        facets.g1(wo, m) * (1.0 - boundary.reflectance)
+    })
+}
+
+impl<C: ColorModel> Bsdf<C> for RoughPlastic<C> {
+    fn lobes(&self) -> Lobes {
+        Lobes::REFLECTION
+    }
+
+    fn eval(
+        &self,
+        at: &Interaction<'_>,
+        wi: Vec3,
+        wo: Vec3,
+        w: &C::Wavelengths,
+    ) -> Option<BsdfValue<C::Sample>> {
+        if wi.z <= 0.0 || wo.z <= 0.0 {
+            return None;
+        }
+        let m = (wi + wo).normalize();
+        let d = self.distribution.eval(m);
+        let (t_i, t_o) = (self.passes(wi.z), self.passes(wo.z));
+        let reflectance = fresnel::dielectric(wi.dot(m), self.base.eta).reflectance;
+        let specular = reflectance * d * self.distribution.g(wi, wo, m) / (4.0 * wi.z);
+        let probability = coat_probability(1.0 - t_i, self.specular_weight);
+        let coat_pdf = self.distribution.pdf(wi, m) / (4.0 * wo.dot(m));
+        Some(BsdfValue {
+            value: self.specular_reflectance.eval(at, w) * specular
+                + self.base.eval(at, t_i, t_o, wo.z, w),
+            pdf: probability * coat_pdf + (1.0 - probability) * warp::cosine_hemisphere_pdf(wo.z),
+        })
+    }
+
+    fn sample(
+        &self,
+        at: &Interaction<'_>,
+        wi: Vec3,
+        u1: f32,
+        u2: Vec2,
+        w: &C::Wavelengths,
+    ) -> Option<BsdfSample<C::Sample>> {
+        if wi.z <= 0.0 {
+            return None;
+        }
+        let probability = coat_probability(1.0 - self.passes(wi.z), self.specular_weight);
+        let wo = if u1 < probability {
+            fresnel::reflect(wi, self.distribution.sample(wi, u2))
+        } else {
+            warp::cosine_hemisphere(u2)
+        };
+        self.eval(at, wi, wo, w)?.as_sample(wo, 1.0)
+    }
+}
