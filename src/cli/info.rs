@@ -199,6 +199,10 @@ fn text(value: &Value) -> String {
     match value {
         Value::Null => "none".to_owned(),
         Value::Bool(yes) => if *yes { "yes" } else { "no" }.to_owned(),
+        Value::Number(number) if number.is_f64() => {
+            // Most were floats of seven digits.
+            (number.as_f64().unwrap_or_default() as f32).to_string()
+        }
         Value::Number(number) => number.to_string(),
         Value::String(text) => text.clone(),
         Value::Array(values) if values.is_empty() => "none".to_owned(),
@@ -209,10 +213,24 @@ fn text(value: &Value) -> String {
         Value::Array(values) => values.iter().map(text).collect::<Vec<_>>().join(", "),
         Value::Object(object) if object.is_empty() => "none".to_owned(),
         Value::Object(object) => {
-            let fields = object.iter().filter(|(_, value)| !value.is_null());
-            let fields =
-                fields.map(|(name, value)| format!("{} {}", name.replace('_', " "), text(value)));
-            fields.collect::<Vec<_>>().join(", ")
+            let title = ["name", "id", "path"]
+                .into_iter()
+                .find(|key| object.contains_key(*key));
+            let fields: Vec<String> = object
+                .iter()
+                .filter(|(name, value)| !value.is_null() && Some(name.as_str()) != title)
+                .map(
+                    |(name, value)| match value.as_u64().filter(|_| name == "bytes") {
+                        Some(bytes) => human_bytes(bytes),
+                        None => format!("{} {}", name.replace('_', " "), text(value)),
+                    },
+                )
+                .collect();
+            let title = title
+                .map(|key| &object[key])
+                .filter(|title| !title.is_null());
+            let title = title.map_or_else(String::new, |title| format!("{}: ", text(title)));
+            title + &fields.join(", ")
         }
     }
 }

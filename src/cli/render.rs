@@ -85,10 +85,10 @@ pub(super) struct Arguments {
     /// Stop an image after so many seconds, and write what is complete
     #[arg(long, value_name = "SECONDS", value_parser = parse::seconds, help_heading = RUN)]
     time_limit: Option<Duration>,
-    /// Keep what is done in OUT.checkpoint, every so many seconds and when stopped
+    /// Keep what is done in OUT.checkpoint, every so many seconds and when stopped; it is removed in the end
     #[arg(long, value_name = "SECONDS", value_parser = parse::seconds, help_heading = RUN)]
     checkpoint: Option<Duration>,
-    /// Go on from OUT.checkpoint where it is there; the image is the same as without interruption
+    /// Go on from OUT.checkpoint where it is there, to the same image as without interruption
     #[arg(long, help_heading = RUN)]
     resume: bool,
     /// Refuse to take more memory, such as 8G; "none" for no limit. By default 90 % of what is free
@@ -137,7 +137,7 @@ enum Accel {
 }
 
 impl Arguments {
-    fn options(&self, item: &Item) -> Options {
+    fn options(&self, item: &Item, memory_limit: Option<u64>) -> Options {
         let checkpoint = Checkpoint {
             path: item.checkpoint(),
             every: self.checkpoint,
@@ -154,7 +154,7 @@ impl Arguments {
             },
             sensor: item.sensor,
             checkpoint: (self.checkpoint.is_some() || self.resume).then_some(checkpoint),
-            memory_limit: self.memory_limit,
+            memory_limit,
         }
     }
 
@@ -204,6 +204,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         arguments,
         session: Session::default(),
         read: None,
+        memory_limit: arguments
+            .memory_limit
+            .or_else(|| memory::available().map(|free| free / 10 * 9)),
         told: Vec::new(),
         stop,
     };
@@ -241,6 +244,8 @@ struct Series<'a> {
     session: Session,
     /// The bare mesh that was read last, and how: its frames need it read but once.
     read: Option<(PathBuf, description::Options, Description)>,
+    /// Found out before anything is loaded, for a scene in memory counts as taken.
+    memory_limit: Option<u64>,
     /// Warnings that were told already.
     told: Vec<Problem>,
     stop: Stop,
@@ -251,10 +256,7 @@ impl Series<'_> {
         let arguments = self.arguments;
         let deadline = arguments.time_limit.map(|limit| Instant::now() + limit);
         let stop = self.stop.by(deadline);
-        let mut options = arguments.options(item);
-        if options.memory_limit.is_none() {
-            options.memory_limit = memory::available().map(|free| free / 10 * 9);
-        }
+        let options = arguments.options(item, self.memory_limit);
         if arguments.checkpoint.is_some() && !arguments.resume && item.checkpoint().exists() {
             let path = item.checkpoint();
             self.warn(&Error::input(format!(

@@ -24,7 +24,7 @@ use crate::integrator::Stats;
 pub struct Checkpoint {
     /// The file.
     pub path: PathBuf,
-    /// Time between two writings; `None`: it is only read.
+    /// Time between two writings; `None`: it is written when the render is stopped, and only then.
     pub every: Option<Duration>,
     /// Whether a file that is there is continued.
     pub resume: bool,
@@ -118,7 +118,7 @@ impl Keeper {
     /// After the last unit of a render that was stopped. That of a whole one stays as it is until its image
     /// is written: see [`Checkpoint::remove`].
     pub(super) fn finish(&mut self, summed: &Summed, whole: bool) {
-        if !whole && self.checkpoint.every.is_some() {
+        if !whole {
             self.keep(summed);
         }
     }

@@ -31,16 +31,18 @@ pub(super) struct Fingerprint {
 }
 
 impl Fingerprint {
-    /// Reads every file that the scene names.
+    /// With the [`contents`] of the files that the scene names.
     pub(super) fn new(
         description: &Description,
         sensor: NodeId,
+        contents: &str,
         options: &Options,
     ) -> Result<Self> {
         let scene = description.canonical(Part::Scene);
         let view = description.canonical(Part::View(sensor));
         let mut files = Hasher::new();
-        for path in scene.files.iter().chain(&view.files) {
+        files.update(contents.as_bytes());
+        for path in &view.files {
             hash_file(&mut files, path)?;
         }
         let bands = match options.colors {
@@ -89,6 +91,15 @@ impl Fingerprint {
         .find(|(a, b, _)| a != b)
         .map(|(_, _, what)| what)
     }
+}
+
+/// The hash of all files that the scene names: it takes the time to read them.
+pub(super) fn contents(description: &Description) -> Result<String> {
+    let mut hasher = Hasher::new();
+    for path in description.canonical(Part::Scene).files {
+        hash_file(&mut hasher, &path)?;
+    }
+    Ok(hex(&hasher))
 }
 
 fn hash(text: &str) -> String {

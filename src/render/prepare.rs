@@ -3,6 +3,7 @@
 //! the next render, which may be of another view or frame.
 
 use std::any::Any;
+use std::sync::OnceLock;
 
 use super::fingerprint::{self, Fingerprint};
 use super::memory::{self, Estimate};
@@ -28,6 +29,8 @@ pub(super) struct Kept {
     /// A `Scene<C>`, where the key's colours say which `C`.
     scene: Box<dyn Any + Send>,
     facts: Facts,
+    /// The time that it took, until a render has told it.
+    pub(super) spent: Seconds,
 }
 
 /// What two renders must agree in to share a scene.
@@ -47,6 +50,8 @@ pub(super) struct Facts {
     /// Bytes of geometry and of trees.
     pub(super) bytes: [usize; 2],
     pub(super) warnings: Vec<Problem>,
+    /// The hash of the scene's files, once it was asked for.
+    contents: OnceLock<String>,
 }
 
 /// What a scene is looked at with.
@@ -67,6 +72,8 @@ pub(super) struct Job<'k, C: ColorModel> {
     pub(super) facts: &'k Facts,
     pub(super) view: View<C>,
     pub(super) seed: u64,
+    /// What loading and building took, unless that was told before.
+    pub(super) spent: Seconds,
     pub(super) warnings: Vec<Problem>,
 }
 
@@ -140,8 +147,8 @@ fn make<C: ColorModel>(
     color: C,
     film: u64,
     progress: &dyn Progress,
-    seconds: &mut Seconds,
-) -> Result<(Scene<C>, Facts)> {
+) -> Result<(Scene<C>, Facts, Seconds)> {
+    let mut seconds = Seconds::default();
     let announced = Estimate {
         film,
         ..Estimate::of_files(description)
@@ -169,8 +176,9 @@ fn make<C: ColorModel>(
         bounds: scene.tracer().bounds(),
         bytes: [assets.bytes(), scene.tracer().tree_bytes()],
         warnings: assets.warnings().to_vec(),
+        contents: OnceLock::new(),
     };
-    Ok((scene, facts))
+    Ok((scene, facts, seconds))
 }
 
 /// Builds the job; `kept` is its scene where the description's is equal, else it makes room for the new one.
@@ -180,7 +188,6 @@ pub(super) fn prepare<'k, C: ColorModel>(
     options: &Options,
     color: C,
     progress: &dyn Progress,
-    seconds: &mut Seconds,
 ) -> Result<Job<'k, C>> {
     let mut problems = Problems::default();
     let key = Key {
@@ -200,11 +207,12 @@ pub(super) fn prepare<'k, C: ColorModel>(
         }
     } else {
         *kept = None;
-        let made = make(description, options, color, film, progress, seconds);
-        *kept = problems.take(made).map(|(scene, facts)| Kept {
+        let made = make(description, options, color, film, progress);
+        *kept = problems.take(made).map(|(scene, facts, spent)| Kept {
             key,
             scene: Box::new(scene),
             facts,
+            spent,
         });
     }
     if view.is_some() && kept.is_some() {
@@ -236,6 +244,7 @@ pub(super) fn prepare<'k, C: ColorModel>(
         facts,
         view,
         seed: options.seed,
+        spent: kept.spent,
         warnings,
     })
 }
@@ -254,9 +263,22 @@ impl<C: ColorModel> Job<'_, C> {
         channels(self.scene.color(), &self.view.integrator)
     }
 
-    /// What the image depends on.
-    pub(super) fn fingerprint(description: &Description, options: &Options) -> Result<Fingerprint> {
-        Fingerprint::new(description, sensor(description, options)?, options)
+    /// What the image depends on; the scene's files are read for it once.
+    pub(super) fn fingerprint(
+        &self,
+        description: &Description,
+        options: &Options,
+    ) -> Result<Fingerprint> {
+        let known = &self.facts.contents;
+        let contents = match known.get() {
+            Some(contents) => contents,
+            None => {
+                let contents = fingerprint::contents(description)?;
+                known.get_or_init(|| contents)
+            }
+        };
+        let sensor = sensor(description, options)?;
+        Fingerprint::new(description, sensor, contents, options)
     }
 
     /// The crop's place on the film.

@@ -9,7 +9,7 @@ use rayon::ThreadPool;
 use super::checkpoint::Keeper;
 use super::options::{Colors, Options};
 use super::plan::Plan;
-use super::prepare::{self, Facts, Job, Kept};
+use super::prepare::{self, Facts, Kept};
 use super::progress::Progress;
 use super::sums::Sums;
 use super::unit::{self, Summed};
@@ -77,12 +77,10 @@ impl Task for Measure<'_> {
             options,
             progress,
         } = self.0;
-        let mut seconds = Seconds::default();
-        let job = prepare::prepare(kept, description, options, color, progress, &mut seconds)?;
-        Ok(Facts {
-            warnings: job.warnings,
-            ..job.facts.clone()
-        })
+        let job = prepare::prepare(kept, description, options, color, progress)?;
+        let mut facts = job.facts.clone();
+        facts.warnings = job.warnings;
+        Ok(facts)
     }
 }
 
@@ -99,8 +97,7 @@ impl Task for Render<'_> {
             options,
             progress,
         } = self.0;
-        let mut seconds = Seconds::default();
-        let job = prepare::prepare(kept, description, options, color, progress, &mut seconds)?;
+        let job = prepare::prepare(kept, description, options, color, progress)?;
         let plan = Plan::new(&job.view.film, job.view.sampler.sample_count());
         let mut summed = Summed {
             sums: Sums::try_new(job.view.film.crop, job.channels())?,
@@ -108,10 +105,11 @@ impl Task for Render<'_> {
         };
         let mut keeper = None;
         if let Some(checkpoint) = &options.checkpoint {
-            let fingerprint = Job::<C>::fingerprint(description, options)?;
+            let fingerprint = job.fingerprint(description, options)?;
             let keeper = keeper.insert(Keeper::new(checkpoint.clone(), fingerprint));
             keeper.resume(&mut summed, plan.units())?;
         }
+        let mut seconds = job.spent;
         let summed = timed(&mut seconds.render, || {
             unit::run(&job, &plan, summed, progress, keeper.as_mut())
         });
@@ -128,13 +126,17 @@ impl Task for Render<'_> {
         report.dropped_samples = sums.dropped;
         report.dropped_pixel = sums.dropped_pixel;
         warnings.extend(sums.warning());
-        Ok(Rendered {
+        let rendered = Rendered {
             image: sums.develop(&job.view.film)?,
             window: job.window(),
             metadata: job.metadata(&options.scene, &report),
             report,
             warnings,
-        })
+        };
+        if let Some(kept) = kept {
+            kept.spent = Seconds::default();
+        }
+        Ok(rendered)
     }
 }
 

@@ -248,6 +248,32 @@ fn no_damage_to_a_checkpoint_is_believed() {
 }
 
 #[test]
+fn without_an_interval_a_checkpoint_is_written_when_the_render_is_stopped() {
+    let place = Place::new();
+    let mut options = place.keeping();
+    options.checkpoint.as_mut().unwrap().every = None;
+    let (scene, path) = (place.scene(SCENE), place.path("image.exr.checkpoint"));
+    render(&scene, &options, &Silent).unwrap();
+    assert!(!path.exists());
+    render(&scene, &options, &Watch::stopping_after(3)).unwrap();
+    assert!(path.exists());
+}
+
+#[test]
+fn the_time_to_load_is_told_by_the_render_that_first_made_use_of_it() {
+    let place = Place::new();
+    let (mut session, options) = (Session::default(), Options::default());
+    let scene = place.scene(SCENE);
+    session.bounds(&scene, &options, &Silent).unwrap();
+    let mut load = || {
+        let rendered = session.render(&scene, &options, &Silent).unwrap();
+        rendered.report.seconds.load
+    };
+    assert!(load() > 0.0);
+    assert_eq!(load(), 0.0);
+}
+
+#[test]
 fn a_checkpoint_that_cannot_be_written_is_a_warning() {
     let place = Place::new();
     let mut options = place.keeping();
@@ -335,8 +361,8 @@ fn what_does_not_fit_into_memory_is_refused_before_anything_is_loaded() {
 #[test]
 fn samples_that_are_not_finite_are_dropped_counted_and_told() {
     let place = Place::new();
-    // Of two lights one is chosen, which doubles the other's light: too much for a float.
-    let bright = "type='point'/><emitter type='constant'><rgb name='radiance' value='3e38, 3e38, 3e38'/></emitter";
+    // Nearer than a unit of length, what the light sends exceeds what a float holds.
+    let bright = "type='point'><point name='position' value='0, 0, 1.2'/><rgb name='intensity' value='3e38'/></emitter";
     let scene = place.scene(&SCENE.replace("type='constant'/", bright));
     let rendered = render(&scene, &Options::default(), &Silent).unwrap();
     assert!(rendered.report.dropped_samples > 0);

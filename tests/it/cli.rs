@@ -299,8 +299,12 @@ fn info_counts_what_scenes_meshes_and_images_hold() {
     assert_eq!(image["channels"].as_array().unwrap().len(), 3);
     let text = place.run("info scene.xml mesh.ply image.exr missing.png");
     let lines = text.ends_with(3).stdout();
-    assert!(
-        lines.contains("mesh.ply\n") && lines.contains("  triangles "),
-        "{lines}"
-    );
+    for line in [
+        "mesh.ply\n",
+        "  triangles                  1\n",
+        "    front: plugin perspective, size 24, 16, spp 2\n",
+        "    R: greatest ",
+    ] {
+        assert!(lines.contains(line), "{line:?}: {lines}");
+    }
 }

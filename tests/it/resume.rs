@@ -119,11 +119,20 @@ fn a_render_that_is_killed_at_ten_random_moments_ends_with_the_same_bits() {
 #[test]
 fn each_signal_leaves_a_valid_image_and_a_second_start_finishes_it() {
     let place = Place::new();
-    assert!(place.run(&["-o", "whole.exr", "-q"]).status.success());
+    let whole = place.run(&["-o", "whole.exr", "-q", "--spp", "200"]);
+    assert!(whole.status.success());
     for signal in ["INT", "TERM", "HUP"] {
         let name = format!("{signal}.exr");
         let checkpoint = place.path(&format!("{signal}.exr.checkpoint"));
-        let keeping = ["-o", &name, "--json", "--checkpoint", "0.02"];
+        let keeping = [
+            "-o",
+            &name,
+            "--spp",
+            "200",
+            "--json",
+            "--checkpoint",
+            "0.02",
+        ];
         let child = place.start(&keeping);
         wait_for(&checkpoint);
         let sent = Command::new("kill")
@@ -143,7 +152,7 @@ fn each_signal_leaves_a_valid_image_and_a_second_start_finishes_it() {
             .iter()
             .find(|(name, _)| name == "samples_complete");
         assert_eq!(entry.unwrap().1, samples.to_string());
-        let resumed = place.run(&["-o", &name, "-q", "--resume"]);
+        let resumed = place.run(&["-o", &name, "-q", "--spp", "200", "--resume"]);
         assert!(resumed.status.success() && resumed.stdout.is_empty());
         assert_eq!(read(&place.path(&name)), read(&place.path("whole.exr")));
         assert!(!checkpoint.exists());
