@@ -234,6 +234,32 @@ mod tests {
         element face 1\nproperty list uchar int vertex_indices\nend_header\n\
         0 0 0 255 0 0\n1 0 0 0 255 0\n0 1 0 0 0 255\n3 0 1 2\n";
 
+    /// A red triangle, and a camera at z = 4 that looks at it.
+    const GLTF: &str = r#"{"asset":{"version":"2.0"},"scenes":[{"nodes":[0,1]}],
+        "nodes":[{"mesh":0},{"camera":0,"translation":[0,0,4]}],
+        "cameras":[{"type":"perspective","perspective":{"yfov":0.5,"znear":0.1}}],
+        "materials":[{"pbrMetallicRoughness":{"baseColorFactor":[0.8,0.1,0.1,1]}}],
+        "meshes":[{"primitives":[{"attributes":{"POSITION":0},"material":0}]}],
+        "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]}],
+        "bufferViews":[{"buffer":0,"byteLength":36}],
+        "buffers":[{"byteLength":36,"uri":"data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}]}"#;
+
+    #[test]
+    fn a_gltf_file_is_seen_through_its_own_camera() {
+        let scene = describe("camera.gltf", GLTF);
+        let sensor = scene.root().children(Kind::Sensor)[0];
+        let fov = sensor.float("fov").unwrap().unwrap();
+        assert!((fov - 0.5f64.to_degrees()).abs() < 1e-5);
+        let to_world = sensor.transform("to_world").unwrap().unwrap();
+        let near = |a: DVec3, b: DVec3| assert!(a.distance(b) < 1e-9, "{a}");
+        near(
+            to_world.transform_point3(DVec3::ZERO),
+            DVec3::new(0.0, 0.0, 4.0),
+        );
+        near(to_world.transform_vector3(DVec3::Z), DVec3::NEG_Z);
+        near(to_world.transform_vector3(DVec3::X), DVec3::NEG_X);
+    }
+
     #[test]
     fn a_mesh_with_vertex_colours_shows_them() {
         let mesh = |scene: &Description| {
@@ -243,6 +269,7 @@ mod tests {
             !diffuse.children(Kind::Texture).is_empty()
         };
         assert!(mesh(&describe("colored.ply", PLY)));
+        assert!(mesh(&describe("colored.gltf", GLTF)));
         let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
         assert!(!mesh(&describe("plain.obj", obj)));
     }

@@ -200,3 +200,26 @@ pub fn build<C: ColorModel>(
         surfacing,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::color::Rgb;
+    use crate::description::Options;
+
+    #[test]
+    fn a_texture_that_looks_for_an_attribute_its_shape_lacks_is_an_error_that_names_both() {
+        let text = r#"<scene version="3.0.0"><shape type="cube"><bsdf type="twosided"><bsdf type="diffuse">
+            <texture name="reflectance" type="mesh_attribute"><string name="name" value="face_color"/></texture>
+            </bsdf></bsdf></shape></scene>"#;
+        let scene = Description::parse(text, Path::new("test.xml"), &Options::default()).unwrap();
+        let assets = Assets::load(&scene, &|| ()).unwrap();
+        let error = build(&scene, &assets, Rgb, Method::Tree)
+            .unwrap_err()
+            .to_string();
+        assert!(error.starts_with("test.xml:2"), "{error}");
+        assert!(error.contains("no attribute \"face_color\""), "{error}");
+    }
+}

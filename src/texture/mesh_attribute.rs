@@ -72,3 +72,53 @@ impl<C: ColorModel> Pattern<C> for MeshAttribute<C> {
         C::evaluate_texel(&self.color.texel(scaled, self.role), wavelengths)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::{Vec2, Vec3};
+
+    use super::*;
+    use crate::math::Frame;
+
+    #[test]
+    fn vertex_attributes_are_interpolated_and_face_attributes_are_not() {
+        let mut mesh = crate::mesh::rectangle();
+        let attribute = |name: &str, channels, per, values: &[f32]| Attribute {
+            name: name.to_owned(),
+            channels,
+            per,
+            values: values.to_vec(),
+        };
+        mesh.attributes = vec![
+            attribute(
+                "vertex_c",
+                3,
+                Per::Vertex,
+                &[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 9.0, 9.0, 9.0],
+            ),
+            attribute("face_w", 1, Per::Face, &[0.25, 0.5]),
+        ];
+        let at = |primitive| Interaction {
+            primitive,
+            barycentric: Vec2::new(0.5, 0.3),
+            t: 1.0,
+            position: Vec3::ZERO,
+            error: Vec3::ZERO,
+            normal: Vec3::Z,
+            frame: Frame::around(Vec3::Z),
+            uv: Vec2::ZERO,
+            dp_du: Vec3::X,
+            dp_dv: Vec3::Y,
+            wi: Vec3::Z,
+            time: 0.0,
+            shape: 0,
+            mesh: None,
+        };
+        let of = |i: usize, primitive| value(&mesh.attributes[i], &mesh, &at(primitive)).unwrap();
+        for (ours, expected) in of(0, 0).into_iter().zip([0.2, 0.5, 0.3]) {
+            assert!((ours - expected).abs() < 1e-6);
+        }
+        assert_eq!(of(1, 0), [0.25; 3]);
+        assert_eq!(of(1, 1), [0.5; 3]);
+    }
+}
