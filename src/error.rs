@@ -139,6 +139,21 @@ impl Error {
         self
     }
 
+    /// Says where the file is named whose problems these are.
+    #[must_use]
+    pub fn named_at(mut self, location: &Location) -> Self {
+        for problem in &mut self.problems {
+            if problem.location.is_none() {
+                problem.location = Some(location.clone());
+            } else {
+                problem
+                    .related
+                    .get_or_insert_with(|| (location.clone(), "named".to_owned()));
+            }
+        }
+        self
+    }
+
     /// Says how to mend it, where that is not said yet.
     #[must_use]
     pub fn help(mut self, help: impl Into<String>) -> Self {

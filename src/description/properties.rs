@@ -164,6 +164,22 @@ impl<'a> Properties<'a> {
         children
     }
 
+    /// The nested object of a kind, of which there can be one.
+    ///
+    /// # Errors
+    /// Where there is a second.
+    pub fn child(&self, kind: Kind) -> Result<Option<Properties<'a>>> {
+        let children = self.children(kind);
+        match children.get(1) {
+            None => Ok(children.first().copied()),
+            Some(second) => {
+                let message = format!("{} {:?} has a second {kind}", self.kind(), self.plugin());
+                let error = Error::input(message).at(second.location());
+                Err(error.related(children[0].location(), "the first"))
+            }
+        }
+    }
+
     /// All properties in file order, for plugins whose property names are the user's. None counts as read by it: see
     /// [`Property::mark_read`].
     pub fn all(&self) -> &'a [Property] {

@@ -8,6 +8,8 @@ use crate::error::Result;
 #[derive(Clone, Debug)]
 pub struct Gaussian {
     stddev: f32,
+    /// The bell where it is cut off.
+    floor: f32,
 }
 
 impl Gaussian {
@@ -20,19 +22,25 @@ impl Gaussian {
             );
             return Err(properties.error("stddev", message));
         }
-        Ok(Self {
-            stddev: stddev as f32,
-        })
+        Ok(Self::new(stddev as f32))
     }
 
-    fn bell(&self, x: f32) -> f32 {
-        (-0.5 * (x / self.stddev).powi(2)).exp()
+    fn new(stddev: f32) -> Self {
+        Self {
+            stddev,
+            floor: bell(4.0),
+        }
     }
+}
+
+/// exp(−x²/2).
+fn bell(x: f32) -> f32 {
+    (-0.5 * x * x).exp()
 }
 
 impl Default for Gaussian {
     fn default() -> Self {
-        Self { stddev: 0.5 }
+        Self::new(0.5)
     }
 }
 
@@ -42,6 +50,6 @@ impl Kernel for Gaussian {
     }
 
     fn eval(&self, x: f32) -> f32 {
-        (self.bell(x) - self.bell(self.radius())).max(0.0)
+        (bell(x / self.stddev) - self.floor).max(0.0)
     }
 }

@@ -41,7 +41,7 @@ impl Default for Filter {
 }
 
 /// The widest radius in pixels, so that a tile's border stays small.
-const MAX_RADIUS: f64 = 16.0;
+pub(crate) const MAX_RADIUS: f64 = 16.0;
 
 /// The property `radius`, in pixels.
 fn radius(properties: &Properties<'_>, default: f64) -> Result<f32> {

@@ -100,24 +100,23 @@ pub(super) fn sensor(description: &Description, options: &Options) -> Result<Nod
 pub(super) fn view<C: ColorModel>(description: &Description, sensor: NodeId) -> Result<View<C>> {
     let mut problems = Problems::default();
     let properties = description.node(sensor);
-    let film = match properties.children(Kind::Film).first() {
-        Some(film) => problems.take(Film::build(film)),
+    let film = match properties.child(Kind::Film)? {
+        Some(film) => problems.take(Film::build(&film)),
         None => Some(Film::default()),
     };
     let sensor = film
         .as_ref()
         .and_then(|film| problems.take(Sensor::build(&properties, film)));
-    let sampler = match properties.children(Kind::Sampler).first() {
-        Some(sampler) => problems.take(Sampler::build(sampler, &())),
+    let sampler = match properties.child(Kind::Sampler)? {
+        Some(sampler) => problems.take(Sampler::build(&sampler, &())),
         None => {
             problems.push(properties.error("", "the sensor has no sampler"));
             None
         }
     };
-    let (integrator, integrator_name) = match description.root().children(Kind::Integrator).first()
-    {
+    let (integrator, integrator_name) = match description.root().child(Kind::Integrator)? {
         Some(child) => (
-            problems.take(Integrator::build(child, &())),
+            problems.take(Integrator::build(&child, &())),
             child.plugin().to_owned(),
         ),
         None => (Some(Integrator::default()), "path".to_owned()),
@@ -154,7 +153,13 @@ fn make<C: ColorModel>(
         ..Estimate::of_files(description)
     };
     announced.check(options.memory_limit)?;
-    let assets = timed(&mut seconds.load, || load(description, progress))?;
+    let assets = timed(&mut seconds.load, || load(description, progress)).map_err(|error| {
+        // What is wrong with materials is told along with what is wrong with shapes.
+        let mut problems = Problems::default();
+        problems.push(error);
+        problems.take(scene::check_materials(description, color.clone()));
+        problems.finish().expect_err("shapes have problems")
+    })?;
     let primitives = assets.primitive_count();
     let loaded = Estimate {
         film,

@@ -7,7 +7,7 @@
 
 use crate::color::luminance;
 use crate::error::{Error, Problem, Result};
-use crate::filter::Filter;
+use crate::filter::{Filter, MAX_RADIUS};
 use crate::image::Image;
 use crate::integrator::Stats;
 use crate::sensor::{Film, PixelFormat, Window};
@@ -16,6 +16,9 @@ use crate::sensor::{Film, PixelFormat, Window};
 pub(super) fn border(filter: &Filter) -> u32 {
     (filter.radius() + 0.5).ceil() as u32 - 1
 }
+
+/// The most pixels along an axis that a sample reaches.
+const MAX_REACH: usize = 2 * (MAX_RADIUS as usize + 1) + 1;
 
 /// Sums over a rectangle of pixels.
 #[derive(Clone, Debug)]
@@ -100,15 +103,19 @@ impl Sums {
             height: 1,
         };
         let reached = center.grown(border, &self.window);
-        // Relative to the sample's own pixel, where f32 is exact.
+        // One kernel value a column and a row; relative to the sample's own pixel, where f32 is exact.
         let weight = |pixel: u32, own: u32, offset: f32| {
             filter.eval((f64::from(pixel) - f64::from(own)) as f32 + 0.5 - offset)
         };
+        let mut columns = [0.0; MAX_REACH];
+        for (column, px) in columns.iter_mut().zip(reached.x..reached.x + reached.width) {
+            *column = weight(px, x, offset.x);
+        }
         let stride = self.channels.len() + 1;
         for py in reached.y..reached.y + reached.height {
             let wy = weight(py, y, offset.y);
-            for px in reached.x..reached.x + reached.width {
-                let w = f64::from(wy * weight(px, x, offset.x));
+            for (px, wx) in (reached.x..reached.x + reached.width).zip(columns) {
+                let w = f64::from(wy * wx);
                 if w == 0.0 {
                     continue;
                 }

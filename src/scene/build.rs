@@ -58,24 +58,6 @@ impl<C: ColorModel> Builder<'_, C> {
         Some(LightId(self.lights.len() as u32 - 1))
     }
 
-    /// At most one nested plugin of a kind.
-    fn single<'a>(&mut self, properties: &Properties<'a>, kind: Kind) -> Option<Properties<'a>> {
-        let children = properties.children(kind);
-        if let Some(second) = children.get(1) {
-            let error = Error::input(format!(
-                "{} \"{}\" has a second {kind}",
-                properties.kind(),
-                properties.plugin()
-            ));
-            self.problems.push(
-                error
-                    .at(second.location())
-                    .related(children[0].location(), "the first"),
-            );
-        }
-        children.first().copied()
-    }
-
     /// That the shape has the attributes that textures in `user` look for.
     fn check_attributes(
         &mut self,
@@ -114,8 +96,11 @@ impl<C: ColorModel> Builder<'_, C> {
         properties: &Properties<'_>,
         geometry: &Arc<Geometry>,
     ) -> Option<Surfacing> {
-        let emitter = self.single(properties, Kind::Emitter);
-        let bsdf = self.single(properties, Kind::Bsdf);
+        let emitter = self
+            .problems
+            .take(properties.child(Kind::Emitter))
+            .flatten();
+        let bsdf = self.problems.take(properties.child(Kind::Bsdf)).flatten();
         for user in emitter.iter().chain(&bsdf) {
             self.check_attributes(properties, geometry, user);
         }
@@ -141,6 +126,21 @@ impl<C: ColorModel> Builder<'_, C> {
         };
         Some(Surfacing { material, light })
     }
+}
+
+/// Builds the materials of a scene's shapes for nothing but their problems, where the shapes themselves
+/// cannot be loaded.
+pub fn check_materials<C: ColorModel>(description: &Description, color: C) -> Result<()> {
+    let palettes = Palettes::new(color);
+    let mut problems = Problems::default();
+    let mut shapes = description.root().children(Kind::Shape);
+    while let Some(shape) = shapes.pop() {
+        shapes.extend(shape.children(Kind::Shape));
+        for bsdf in shape.children(Kind::Bsdf) {
+            problems.take(Material::<C>::build(&bsdf, &palettes));
+        }
+    }
+    problems.finish()
 }
 
 /// Builds the scene that `description` holds, with its geometry loaded.

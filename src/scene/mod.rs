@@ -13,7 +13,7 @@ use crate::light::{Light, LightSample};
 use crate::material::Material;
 
 pub use assets::Assets;
-pub use build::build;
+pub use build::{build, check_materials};
 
 /// A material's place in its scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

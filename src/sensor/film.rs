@@ -189,8 +189,8 @@ impl Film {
         ] {
             properties.ignore(name);
         }
-        let filter = match properties.children(Kind::Filter).first() {
-            Some(child) => Filter::build(child, &())?,
+        let filter = match properties.child(Kind::Filter)? {
+            Some(child) => Filter::build(&child, &())?,
             None => Filter::default(),
         };
         Ok(Self {

@@ -215,7 +215,7 @@ pub(super) fn load(properties: &Properties<'_>, options: ReadOptions) -> Result<
         flip_tex_coords,
         ..options
     };
-    let loaded = read(&path, &options).map_err(|e| e.at(properties.location()))?;
+    let loaded = read(&path, &options).map_err(|e| e.named_at(properties.location()))?;
     let mut shape = place(loaded.mesh, properties)?;
     shape.warnings.splice(0..0, loaded.warnings);
     Ok(shape)
