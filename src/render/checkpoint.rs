@@ -8,27 +8,16 @@
 use std::fs::{self, File};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use blake3::Hasher;
 use serde::{Deserialize, Serialize};
 
 use super::fingerprint::Fingerprint;
-use super::sums::Sums;
-use super::unit::Summed;
+use super::options::Checkpoint;
+use super::sums::{Summed, Sums};
 use crate::error::{Error, Problem, Result};
 use crate::integrator::Stats;
-
-/// Where and how often a render is kept.
-#[derive(Clone, Debug)]
-pub struct Checkpoint {
-    /// The file.
-    pub path: PathBuf,
-    /// Time between two writings; `None`: it is written when the render is stopped, and only then.
-    pub every: Option<Duration>,
-    /// Whether a file that is there is continued.
-    pub resume: bool,
-}
 
 impl Checkpoint {
     /// Removes the file, if there is one: the image is written, and there is nothing left to continue.

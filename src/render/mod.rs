@@ -28,10 +28,9 @@ use crate::integrator::Stats;
 
 pub use bare::{UpAxis, describe_mesh, is_mesh};
 pub use check::check;
-pub use checkpoint::Checkpoint;
 pub use info::{NamedFile, SceneInfo, SensorInfo};
 pub use memory::human_bytes;
-pub use options::{Colors, Options, Overrides};
+pub use options::{Checkpoint, Colors, Options, Overrides};
 pub use plan::Completed;
 pub use progress::{Phase, Progress, Silent};
 pub use session::Session;

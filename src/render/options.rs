@@ -1,8 +1,9 @@
 //! What the caller of a render decides: settings of the run, and overrides of what the scene says.
 
 use std::num::NonZeroUsize;
+use std::path::PathBuf;
+use std::time::Duration;
 
-use super::checkpoint::Checkpoint;
 use crate::accel::Method;
 use crate::description::{Description, Kind, NodeId, Value};
 use crate::sensor::Window;
@@ -15,6 +16,17 @@ pub enum Colors {
     Rgb,
     /// So many spectral bands over 360–830 nm, 1 to 32.
     Bands(usize),
+}
+
+/// Where and how often a render is kept.
+#[derive(Clone, Debug)]
+pub struct Checkpoint {
+    /// The file.
+    pub path: PathBuf,
+    /// Time between two writings; `None`: it is written when the render is stopped, and only then.
+    pub every: Option<Duration>,
+    /// Whether a file that is there is continued.
+    pub resume: bool,
 }
 
 /// Settings of a run, which no scene file knows.

@@ -36,6 +36,14 @@ pub(super) struct Sums {
     pub(super) dropped_pixel: Option<[u32; 2]>,
 }
 
+/// The film's sums after a number of units.
+#[derive(Debug)]
+pub(super) struct Summed {
+    pub(super) sums: Sums,
+    /// The first unit that is not in the sums.
+    pub(super) next: usize,
+}
+
 impl Sums {
     /// Nothing yet.
     pub(super) fn new(window: Window, channels: Vec<String>) -> Self {

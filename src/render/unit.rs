@@ -12,7 +12,7 @@ use super::checkpoint::Keeper;
 use super::plan::Plan;
 use super::prepare::Job;
 use super::progress::{Phase, Progress};
-use super::sums::{Sums, border};
+use super::sums::{Summed, Sums, border};
 use crate::color::ColorModel;
 use crate::integrator::{Estimates, Estimator, Start};
 use crate::sampler::Stream;
@@ -20,14 +20,6 @@ use crate::sensor::Window;
 
 /// Bytes of path state in flight in a batch: within a core's caches, with rays enough for the tracer.
 const BATCH_BYTES: usize = 512 << 10;
-
-/// The film's sums after a number of units.
-#[derive(Debug)]
-pub(super) struct Summed {
-    pub(super) sums: Sums,
-    /// The first unit that is not in the sums.
-    pub(super) next: usize,
-}
 
 /// The film while it is being summed up.
 struct Reduction<'k> {
