@@ -3,10 +3,12 @@
 //! f(wi, wo)·|cos θ_o|.
 
 mod blendbsdf;
+mod bumpmap;
 mod conductor;
 mod dielectric;
 mod diffuse;
 mod mask;
+mod normalmap;
 mod null;
 mod plastic;
 mod principled;
@@ -21,6 +23,7 @@ mod disney;
 mod fresnel;
 mod ior;
 mod microfacet;
+mod perturbed;
 
 use glam::{Vec2, Vec3};
 
@@ -145,10 +148,12 @@ family! {
     #[derive(Clone, Debug)]
     pub enum Material<C>: Bsdf, kind "bsdf", context Palettes<C> {
         "blendbsdf" => BlendBsdf(blendbsdf::BlendBsdf<C>),
+        "bumpmap" => BumpMap(bumpmap::BumpMap<C>),
         "conductor" => Conductor(conductor::Conductor<C>),
         "dielectric" => Dielectric(dielectric::Dielectric<C>),
         "diffuse" => Diffuse(diffuse::Diffuse<C>),
         "mask" => Mask(mask::Mask<C>),
+        "normalmap" => NormalMap(normalmap::NormalMap<C>),
         "null" => Null(null::Null),
         "plastic" => Plastic(plastic::Plastic<C>),
         "principled" => Principled(principled::Principled<C>),

@@ -16,6 +16,10 @@ const MATERIALS: &[(&str, &str)] = &[
         r#"<bsdf type="blendbsdf"><float name="weight" value="0.3"/><bsdf type="conductor"/><bsdf type="diffuse"/></bsdf>"#,
     ),
     (
+        "bumpmap",
+        r#"<bsdf type="bumpmap"><texture type="checkerboard"/><bsdf type="roughconductor"/></bsdf>"#,
+    ),
+    (
         "conductor",
         r#"<bsdf type="conductor"><string name="material" value="Cu"/></bsdf>"#,
     ),
@@ -31,6 +35,10 @@ const MATERIALS: &[(&str, &str)] = &[
     (
         "mask",
         r#"<bsdf type="mask"><float name="opacity" value="0.7"/><bsdf type="diffuse"><float name="reflectance" value="1"/></bsdf></bsdf>"#,
+    ),
+    (
+        "normalmap",
+        r#"<bsdf type="normalmap"><texture name="normalmap" type="rawconstant"><vector name="value" value="0.6, 0.45, 0.95"/></texture><bsdf type="diffuse"/></bsdf>"#,
     ),
     ("null", r#"<bsdf type="null"/>"#),
     ("plastic", r#"<bsdf type="plastic"/>"#),
@@ -248,7 +256,9 @@ fn every_material_draws_directions_with_the_density_that_it_says() {
 
 #[test]
 fn reflection_is_reciprocal() {
-    for (name, text) in MATERIALS {
+    // A turned normal is not the surface's, and its cosine not the one that light is counted by.
+    let turned = |name: &str| ["bumpmap", "normalmap"].contains(&name);
+    for (name, text) in MATERIALS.iter().filter(|(name, _)| !turned(name)) {
         let material = build(text);
         for i in 0..2000 {
             let (_, u) = uniforms(i);
@@ -266,4 +276,169 @@ fn reflection_is_reciprocal() {
             assert!((x - y).abs() <= 1e-3 * (x + y) + 1e-6, "{name}: {x} {y}");
         }
     }
+}
+
+/// `wi` and `wo`, to be normalised.
+type Pair = [[f32; 3]; 2];
+const REFLECTED: Pair = [[0.5, 0.2, 0.8], [-0.4, -0.1, 0.7]];
+const INWARD: Pair = [[0.3, -0.2, 0.9], [-0.2, 0.15, -0.8]];
+const OUTWARD: Pair = [[0.1, 0.3, -0.9], [-0.05, -0.3, 0.8]];
+
+/// Values and densities of Mitsuba 3.9.1, `scalar_rgb`.
+const MITSUBA: &[(&str, Pair, [f32; 3], f32)] = &[
+    (
+        r#"<bsdf type="plastic"><boolean name="nonlinear" value="true"/><rgb name="specular_reflectance" value=".5,1,.2"/></bsdf>"#,
+        REFLECTED,
+        [0.0806863, 0.0806863, 0.0806863],
+        0.261504,
+    ),
+    (
+        r#"<bsdf type="blendbsdf"><float name="weight" value="0.3"/><bsdf type="plastic"></bsdf><bsdf type="diffuse"></bsdf></bsdf>"#,
+        REFLECTED,
+        [0.13834, 0.13834, 0.13834],
+        0.259042,
+    ),
+    (
+        r#"<bsdf type="roughconductor"><string name="material" value="Cu"/><string name="distribution" value="beckmann"/><float name="alpha_u" value="0.3"/><float name="alpha_v" value="0.05"/><rgb name="specular_reflectance" value=".5,1,.2"/></bsdf>"#,
+        REFLECTED,
+        [1.12938, 1.47061, 0.242776],
+        2.37381,
+    ),
+    (
+        r#"<bsdf type="roughconductor"><string name="material" value="Cu"/><string name="distribution" value="ggx"/><float name="alpha_u" value="0.3"/><float name="alpha_v" value="0.05"/><rgb name="specular_reflectance" value=".5,1,.2"/></bsdf>"#,
+        REFLECTED,
+        [0.75532, 0.983532, 0.162366],
+        1.59918,
+    ),
+    (
+        r#"<bsdf type="roughconductor"><string name="distribution" value="ggx"/><float name="alpha" value="0.3"/><boolean name="sample_visible" value="false"/><spectrum name="eta" value="400:0.5, 500:1, 600:2, 700:3"/><spectrum name="k" value="2"/></bsdf>"#,
+        REFLECTED,
+        [0.380545, 0.422758, 0.603035],
+        0.987811,
+    ),
+    (
+        r#"<bsdf type="roughdielectric"><string name="distribution" value="beckmann"/><float name="alpha_u" value="0.3"/><float name="alpha_v" value="0.1"/><string name="int_ior" value="diamond"/><string name="ext_ior" value="water"/><rgb name="specular_transmittance" value=".5,1,.2"/></bsdf>"#,
+        REFLECTED,
+        [0.215852, 0.215852, 0.215852],
+        0.215852,
+    ),
+    (
+        r#"<bsdf type="roughdielectric"><string name="distribution" value="beckmann"/><float name="alpha_u" value="0.3"/><float name="alpha_v" value="0.1"/><string name="int_ior" value="diamond"/><string name="ext_ior" value="water"/><rgb name="specular_transmittance" value=".5,1,.2"/></bsdf>"#,
+        INWARD,
+        [0.726558, 1.45312, 0.290623],
+        4.78533,
+    ),
+    (
+        r#"<bsdf type="roughdielectric"><string name="distribution" value="ggx"/><float name="alpha" value="0.3"/><boolean name="sample_visible" value="false"/><float name="int_ior" value="1.2"/></bsdf>"#,
+        INWARD,
+        [51.6607, 51.6607, 51.6607],
+        76.0204,
+    ),
+    (
+        r#"<bsdf type="roughdielectric"><string name="distribution" value="ggx"/><float name="alpha" value="0.3"/><boolean name="sample_visible" value="false"/><float name="int_ior" value="1.2"/></bsdf>"#,
+        OUTWARD,
+        [22.4059, 22.4059, 22.4059],
+        14.4917,
+    ),
+    (
+        r#"<bsdf type="roughplastic"><string name="distribution" value="beckmann"/><float name="alpha" value="0.1"/><rgb name="diffuse_reflectance" value=".1,.27,.36"/></bsdf>"#,
+        REFLECTED,
+        [0.325817, 0.371243, 0.395293],
+        1.34567,
+    ),
+    (
+        r#"<bsdf type="roughplastic"><string name="distribution" value="ggx"/><float name="alpha" value="0.4"/><rgb name="diffuse_reflectance" value=".1,.27,.9"/><boolean name="nonlinear" value="true"/><string name="int_ior" value="diamond"/></bsdf>"#,
+        REFLECTED,
+        [0.101617, 0.108211, 0.159508],
+        0.383586,
+    ),
+    (
+        r#"<bsdf type="principled"><rgb name="base_color" value=".8,.3,.1"/><float name="metallic" value="0.7"/><float name="anisotropic" value="0.6"/><float name="roughness" value="0.3"/><float name="spec_tint" value="0.5"/></bsdf>"#,
+        REFLECTED,
+        [2.49791, 0.953485, 0.335715],
+        3.30148,
+    ),
+    (
+        r#"<bsdf type="principled"><rgb name="base_color" value=".8,.3,.1"/><float name="clearcoat" value="0.9"/><float name="clearcoat_gloss" value="0.3"/><float name="flatness" value="0.5"/><float name="sheen" value="0.5"/><float name="sheen_tint" value="0.4"/></bsdf>"#,
+        REFLECTED,
+        [0.309624, 0.190357, 0.14265],
+        0.988356,
+    ),
+    (
+        r#"<bsdf type="principled"><rgb name="base_color" value=".8,.3,.1"/><float name="spec_trans" value="0.6"/><float name="eta" value="1.6"/><float name="metallic" value="0.2"/><float name="clearcoat" value="0.5"/><float name="main_specular_sampling_rate" value="0.7"/><float name="sheen" value="0.3"/></bsdf>"#,
+        REFLECTED,
+        [0.37938, 0.195547, 0.122014],
+        0.720527,
+    ),
+    (
+        r#"<bsdf type="principled"><rgb name="base_color" value=".8,.3,.1"/><float name="spec_trans" value="0.6"/><float name="eta" value="1.6"/><float name="metallic" value="0.2"/><float name="clearcoat" value="0.5"/><float name="main_specular_sampling_rate" value="0.7"/><float name="sheen" value="0.3"/></bsdf>"#,
+        INWARD,
+        [2.68299, 1.64299, 0.948581],
+        4.70184,
+    ),
+    (
+        r#"<bsdf type="principled"><rgb name="base_color" value=".8,.3,.1"/><float name="spec_trans" value="0.6"/><float name="eta" value="1.6"/><float name="metallic" value="0.2"/><float name="clearcoat" value="0.5"/><float name="main_specular_sampling_rate" value="0.7"/><float name="sheen" value="0.3"/></bsdf>"#,
+        OUTWARD,
+        [2.51277, 1.53875, 0.888397],
+        2.29141,
+    ),
+    (
+        r#"<bsdf type="principledthin"><rgb name="base_color" value=".8,.3,.1"/><float name="spec_trans" value="0.6"/><float name="eta" value="1.6"/><float name="diff_trans" value="0.7"/><float name="spec_tint" value="0.4"/><float name="sheen" value="0.3"/><float name="sheen_tint" value="0.5"/><float name="flatness" value="0.5"/><float name="anisotropic" value="0.5"/></bsdf>"#,
+        REFLECTED,
+        [0.109996, 0.057637, 0.0366932],
+        0.46783,
+    ),
+    (
+        r#"<bsdf type="principledthin"><rgb name="base_color" value=".8,.3,.1"/><float name="spec_trans" value="0.6"/><float name="eta" value="1.6"/><float name="diff_trans" value="0.7"/><float name="spec_tint" value="0.4"/><float name="sheen" value="0.3"/><float name="sheen_tint" value="0.5"/><float name="flatness" value="0.5"/><float name="anisotropic" value="0.5"/></bsdf>"#,
+        INWARD,
+        [2.38712, 0.89517, 0.29839],
+        1.59713,
+    ),
+];
+
+#[test]
+fn values_and_densities_are_those_of_mitsuba() {
+    for (text, pair, value, pdf) in MITSUBA {
+        let [wi, wo] = pair.map(|d| Vec3::from_array(d).normalize());
+        let ours = build(text).eval(&interaction(), wi, wo, &()).unwrap();
+        let near = |a: f32, b: f32| (a - b).abs() <= 5e-4 * b.abs() + 1e-7;
+        assert!(near(ours.pdf, *pdf), "{text}: {} {pdf}", ours.pdf);
+        for c in 0..3 {
+            assert!(near(ours.value[c], value[c]), "{text}: {ours:?} {value:?}");
+        }
+    }
+}
+
+#[test]
+fn a_nearly_smooth_metal_reflects_as_much_as_a_mirror() {
+    let gold = r#"<string name="material" value="Au"/>"#;
+    let mirror = build(&format!(r#"<bsdf type="conductor">{gold}</bsdf>"#));
+    for distribution in ["beckmann", "ggx"] {
+        let rough = build(&format!(
+            r#"<bsdf type="roughconductor">{gold}<float name="alpha" value="0.0001"/>
+            <string name="distribution" value="{distribution}"/></bsdf>"#
+        ));
+        for wi in incidences().filter(|wi| wi.z > 0.0) {
+            let of = |material: &Material<Rgb>, u1, u2| {
+                let sample = material.sample(&interaction(), wi, u1, u2, &());
+                sample.map_or(Vec3::ZERO, |s| Vec3::from_array(s.weight.0))
+            };
+            let n = 2000;
+            let mean = (0..n).fold(Vec3::ZERO, |sum, i| {
+                let (u1, u2) = uniforms(i);
+                sum + of(&rough, u1, u2) / n as f32
+            });
+            let expected = of(&mirror, 0.5, Vec2::splat(0.5));
+            assert!((mean - expected).length() < 5e-3, "{wi}: {mean} {expected}");
+        }
+    }
+}
+
+#[test]
+fn twosided_refuses_what_transmits() {
+    let text = r#"<scene version="3.0.0"><bsdf type="twosided"><bsdf type="null"/></bsdf></scene>"#;
+    let scene = Description::parse(text, Path::new("test.xml"), &Options::default()).unwrap();
+    let bsdf = &scene.root().children(Kind::Bsdf)[0];
+    let error = Material::build(bsdf, &Palettes::new(Rgb)).unwrap_err();
+    assert!(error.to_string().contains("transmits light"), "{error}");
 }

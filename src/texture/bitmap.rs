@@ -52,6 +52,15 @@ pub struct Bitmap<C: ColorModel> {
     to_uv: Mat3,
 }
 
+/// Four neighbouring texels.
+#[derive(Clone, Copy, Debug)]
+struct Cell<S> {
+    /// Two rows of two.
+    corners: [[S; 2]; 2],
+    /// Where the point lies between them, in [0, 1)².
+    f: Vec2,
+}
+
 impl<C: ColorModel> Bitmap<C> {
     pub(super) fn build(properties: &Properties<'_>, palette: &Palette<C>) -> Result<Self> {
         let nearest = match properties.string("filter_type")?.unwrap_or("bilinear") {
@@ -73,6 +82,8 @@ impl<C: ColorModel> Bitmap<C> {
             }
         };
         let raw = properties.boolean("raw")?.unwrap_or(false);
+        // How Mitsuba stores texels; here that follows from what they are for.
+        properties.ignore("format");
         let Some(path) = properties.file("filename")? else {
             return Err(properties.error("filename", "a bitmap needs a filename"));
         };
@@ -98,6 +109,22 @@ impl<C: ColorModel> Bitmap<C> {
             wrap,
             to_uv,
         })
+    }
+
+    fn size(&self) -> Vec2 {
+        Vec2::new(self.texels.width as f32, self.texels.height as f32)
+    }
+
+    /// The four texels around a point.
+    fn cell(&self, uv: Vec2, wavelengths: &C::Wavelengths) -> Cell<C::Sample> {
+        let p = transformed(&self.to_uv, uv) * self.size() - 0.5;
+        let corner = p.floor();
+        let (x, y) = (corner.x as i64, corner.y as i64);
+        let row = |y| [x, x.saturating_add(1)].map(|x| self.texel(x, y, wavelengths));
+        Cell {
+            corners: [y, y.saturating_add(1)].map(row),
+            f: p - corner,
+        }
     }
 
     fn texel(&self, x: i64, y: i64, wavelengths: &C::Wavelengths) -> C::Sample {
@@ -136,20 +163,31 @@ fn load<C: ColorModel>(
 
 impl<C: ColorModel> Pattern<C> for Bitmap<C> {
     fn eval(&self, at: &Interaction<'_>, wavelengths: &C::Wavelengths) -> C::Sample {
-        let size = Vec2::new(self.texels.width as f32, self.texels.height as f32);
-        let p = transformed(&self.to_uv, at.uv) * size;
         if self.nearest {
+            let p = transformed(&self.to_uv, at.uv) * self.size();
             return self.texel(p.x.floor() as i64, p.y.floor() as i64, wavelengths);
         }
-        let p = p - 0.5;
-        let (corner, f) = (p.floor(), p - p.floor());
-        let (x, y) = (corner.x as i64, corner.y as i64);
-        let row = |y| {
-            self.texel(x, y, wavelengths) * (1.0 - f.x)
-                + self.texel(x.saturating_add(1), y, wavelengths) * f.x
-        };
-        let value = row(y) * (1.0 - f.y) + row(y.saturating_add(1)) * f.y;
+        let Cell {
+            corners: [[a, b], [c, d]],
+            f,
+        } = self.cell(at.uv, wavelengths);
+        let value = (a * (1.0 - f.x) + b * f.x) * (1.0 - f.y) + (c * (1.0 - f.x) + d * f.x) * f.y;
         value.map(|v| if v.is_finite() { v } else { 0.0 })
+    }
+
+    fn gradient(&self, at: &Interaction<'_>, wavelengths: &C::Wavelengths) -> [C::Sample; 2] {
+        if self.nearest {
+            return [C::Sample::zero(); 2];
+        }
+        let Cell {
+            corners: [[a, b], [c, d]],
+            f,
+        } = self.cell(at.uv, wavelengths);
+        let size = self.size();
+        let along_x = ((b - a) * (1.0 - f.y) + (d - c) * f.y) * size.x;
+        let along_y = ((c - a) * (1.0 - f.x) + (d - b) * f.x) * size.y;
+        let m = &self.to_uv;
+        [m.x_axis, m.y_axis].map(|axis| along_x * axis.x + along_y * axis.y)
     }
 
     fn resolution(&self) -> [usize; 2] {

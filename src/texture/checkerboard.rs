@@ -1,10 +1,13 @@
-//! `checkerboard`: `color0` (0.4) and `color1` (0.2) in alternate quarters of each unit square of
-//! texture coordinates, after `to_uv`.
+//! `checkerboard`: squares of half a unit of texture coordinates after `to_uv`, `color0` (0.4) in the one at
+//! the origin and on its diagonal, `color1` (0.2) in the others. Where it gives a number, such as a
+//! roughness, Mitsuba 3.9.1 has the two the other way round, and scenes rely on it.
+
+use std::any::TypeId;
 
 use glam::Mat3;
 
 use super::{Palette, Pattern, Texture, to_uv, transformed};
-use crate::color::{Color, ColorModel};
+use crate::color::{Color, ColorModel, Mono};
 use crate::description::Properties;
 use crate::error::Result;
 use crate::interaction::Interaction;
@@ -12,6 +15,7 @@ use crate::interaction::Interaction;
 /// Two textures in a pattern of squares.
 #[derive(Clone, Debug)]
 pub struct Checkerboard<C: ColorModel> {
+    /// In the square at the origin, and beside it.
     colors: Box<[Texture<C>; 2]>,
     to_uv: Mat3,
 }
@@ -20,8 +24,13 @@ impl<C: ColorModel> Checkerboard<C> {
     pub(super) fn build(properties: &Properties<'_>, palette: &Palette<C>) -> Result<Self> {
         let color0 = palette.texture(properties, "color0", palette.role, Color::Grey(0.4))?;
         let color1 = palette.texture(properties, "color1", palette.role, Color::Grey(0.2))?;
+        let numbers = TypeId::of::<C>() == TypeId::of::<Mono>();
         Ok(Self {
-            colors: Box::new([color0, color1]),
+            colors: Box::new(if numbers {
+                [color1, color0]
+            } else {
+                [color0, color1]
+            }),
             to_uv: to_uv(properties)?,
         })
     }
@@ -32,5 +41,34 @@ impl<C: ColorModel> Pattern<C> for Checkerboard<C> {
         let uv = transformed(&self.to_uv, at.uv);
         let upper = (uv - uv.floor()).cmpgt(glam::Vec2::splat(0.5));
         self.colors[usize::from(upper.x != upper.y)].eval(at, wavelengths)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::color::Rgb;
+    use crate::description::{Description, Kind, Options};
+
+    /// Mitsuba 3.9.1.
+    #[test]
+    fn the_square_at_the_origin_has_the_first_colour_and_the_second_number() {
+        let text = r#"<scene version="3.0.0"><texture type="checkerboard"><transform name="to_uv">
+            <scale x="25" y="2.5"/></transform></texture></scene>"#;
+        let path = std::path::Path::new("test.xml");
+        let scene = Description::parse(text, path, &Options::default()).unwrap();
+        let texture = scene.root().children(Kind::Texture)[0];
+        let numbers = Checkerboard::build(&texture, &Palette::new(Mono)).unwrap();
+        let colors = Checkerboard::build(&texture, &Palette::new(Rgb)).unwrap();
+        for (u, v, number, color) in [
+            (0.01, 0.1, 0.2, 0.4),
+            (0.03, 0.1, 0.4, 0.2),
+            (0.01, 0.3, 0.4, 0.2),
+            (0.03, 0.3, 0.2, 0.4),
+        ] {
+            let at = Interaction::at_uv(glam::Vec2::new(u, v));
+            assert_eq!(numbers.eval(&at, &())[0], number, "{u} {v}");
+            assert_eq!(colors.eval(&at, &())[0], color, "{u} {v}");
+        }
     }
 }

@@ -5,6 +5,7 @@ mod bitmap;
 mod checkerboard;
 mod mesh_attribute;
 mod picture;
+mod rawconstant;
 mod uniform;
 
 use std::collections::HashMap;
@@ -13,7 +14,7 @@ use std::sync::{Arc, Mutex};
 
 use glam::{Mat3, Vec2, Vec3};
 
-use crate::color::{Color, ColorModel, Mono, Role};
+use crate::color::{Color, ColorModel, Mono, Rgb, Role, Spectral};
 use crate::description::{Kind, Properties, Property, Spectrum, Value};
 use crate::error::{Error, Result};
 use crate::family::{self, family};
@@ -28,6 +29,11 @@ pub trait Pattern<C: ColorModel>: std::fmt::Debug + Send + Sync {
     /// The value at a point of a surface.
     fn eval(&self, at: &Interaction<'_>, wavelengths: &C::Wavelengths) -> C::Sample;
 
+    /// How the value changes with u and with v; zero where it is constant or does so in steps.
+    fn gradient(&self, _at: &Interaction<'_>, _wavelengths: &C::Wavelengths) -> [C::Sample; 2] {
+        [C::Sample::zero(); 2]
+    }
+
     /// Columns and rows of the image, if it is one; 1 × 1 otherwise.
     fn resolution(&self) -> [usize; 2] {
         [1, 1]
@@ -41,6 +47,7 @@ family! {
         "bitmap" => Bitmap(bitmap::Bitmap<C>),
         "checkerboard" => Checkerboard(checkerboard::Checkerboard<C>),
         "mesh_attribute" => MeshAttribute(mesh_attribute::MeshAttribute<C>),
+        "rawconstant" => RawConstant(rawconstant::RawConstant<C>),
         "uniform" => Uniform(uniform::Uniform<C>),
     }
 }
@@ -149,6 +156,8 @@ pub struct Palettes<C: ColorModel> {
     pub colors: Palette<C>,
     /// For numbers.
     pub numbers: Palette<Mono>,
+    /// For vectors: a normal's components in place of red, green and blue.
+    pub vectors: Palette<Rgb>,
 }
 
 impl<C: ColorModel> Palettes<C> {
@@ -157,6 +166,7 @@ impl<C: ColorModel> Palettes<C> {
         Self {
             colors: Palette::new(color),
             numbers: Palette::new(Mono),
+            vectors: Palette::new(Rgb).with_role(Role::Quantity),
         }
     }
 }

@@ -1,0 +1,114 @@
+//! What `bumpmap` and `normalmap` share: a material seen in another frame than the surface's own, and the
+//! shadowing that hides the edge where the surface itself turns away from the light (Estevez, Lecocq and
+//! Stein, *A microfacet-based shadowing function to solve the bump terminator problem*, 2019).
+
+use glam::{Vec2, Vec3};
+
+use super::{BsdfSample, BsdfValue, Material, nested};
+use crate::color::ColorModel;
+use crate::description::Properties;
+use crate::error::Result;
+use crate::interaction::Interaction;
+use crate::math::Frame;
+use crate::texture::Palettes;
+
+/// The nested material and how it is turned.
+#[derive(Clone, Debug)]
+pub(super) struct Perturbed<C: ColorModel> {
+    pub(super) nested: Box<Material<C>>,
+    flip_invalid_normals: bool,
+    use_shadowing_function: bool,
+}
+
+impl<C: ColorModel> Perturbed<C> {
+    pub(super) fn build(properties: &Properties<'_>, palettes: &Palettes<C>) -> Result<Self> {
+        let mut nested = nested(properties, palettes, 1..=1)?;
+        let switch = |name| Ok::<_, crate::error::Error>(properties.boolean(name)?.unwrap_or(true));
+        Ok(Self {
+            nested: Box::new(nested.remove(0)),
+            flip_invalid_normals: switch("flip_invalid_normals")?,
+            use_shadowing_function: switch("use_shadowing_function")?,
+        })
+    }
+
+    /// The frame around the normal `n`, in coordinates of the surface's shading frame: `n` is turned
+    /// about z where it would face away from `wi`; s follows `tangent`.
+    pub(super) fn frame(&self, wi: Vec3, n: Vec3, tangent: Vec3) -> Frame {
+        let away = wi.z * wi.dot(n) <= 0.0;
+        let n = if away && self.flip_invalid_normals {
+            Vec3::new(-n.x, -n.y, n.z)
+        } else {
+            n
+        };
+        let n = n.try_normalize().unwrap_or(Vec3::Z);
+        Frame::along(n, tangent)
+    }
+
+    /// The share of light from `wo` that the bumps let through.
+    fn shadowing(&self, frame: &Frame, wo: Vec3) -> f32 {
+        if !self.use_shadowing_function {
+            return 1.0;
+        }
+        let tan2 = |v: Vec3| (1.0 - v.z * v.z).max(0.0) / (v.z * v.z);
+        let alpha2 = (0.125 * tan2(frame.n)).min(1.0);
+        2.0 / (1.0 + (1.0 + alpha2 * tan2(wo)).sqrt())
+    }
+
+    pub(super) fn eval(
+        &self,
+        at: &Interaction<'_>,
+        frame: &Frame,
+        wi: Vec3,
+        wo: Vec3,
+        w: &C::Wavelengths,
+    ) -> Option<BsdfValue<C::Sample>> {
+        let turned = frame.to_local(wo);
+        if turned.z * wo.z <= 0.0 {
+            return None;
+        }
+        let (inner, wi) = turned_interaction(at, frame, wi);
+        let value = self.nested.eval(&inner, wi, turned, w)?;
+        Some(BsdfValue {
+            value: value.value * self.shadowing(frame, wo),
+            pdf: value.pdf,
+        })
+    }
+
+    pub(super) fn sample(
+        &self,
+        at: &Interaction<'_>,
+        frame: &Frame,
+        wi: Vec3,
+        u: (f32, Vec2),
+        w: &C::Wavelengths,
+    ) -> Option<BsdfSample<C::Sample>> {
+        let (inner, wi) = turned_interaction(at, frame, wi);
+        let sample = self.nested.sample(&inner, wi, u.0, u.1, w)?;
+        let wo = frame.to_world(sample.wo);
+        (sample.wo.z * wo.z > 0.0).then(|| BsdfSample {
+            wo,
+            weight: sample.weight * self.shadowing(frame, wo),
+            ..sample
+        })
+    }
+}
+
+/// The surface with its shading frame turned to `frame`, and `wi` in that frame.
+fn turned_interaction<'s>(
+    at: &Interaction<'s>,
+    frame: &Frame,
+    wi: Vec3,
+) -> (Interaction<'s>, Vec3) {
+    let world = Frame {
+        s: at.frame.to_world(frame.s),
+        t: at.frame.to_world(frame.t),
+        n: at.frame.to_world(frame.n),
+    };
+    let wi = frame.to_local(wi);
+    let inner = Interaction {
+        frame: world,
+        wi,
+        ..at.clone()
+    };
+    (inner, wi)
+}

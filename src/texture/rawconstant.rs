@@ -1,0 +1,37 @@
+//! `rawconstant`: the same three numbers (a vector) or number everywhere, neither bounded nor upsampled in
+//! RGB: a normal for `normalmap`.
+
+use super::{Palette, Pattern};
+use crate::color::{Color, ColorModel, Role};
+use crate::description::{Properties, Property, Value};
+use crate::error::Result;
+use crate::interaction::Interaction;
+
+/// One stored value.
+#[derive(Clone, Debug)]
+pub struct RawConstant<C: ColorModel> {
+    value: C::Stored,
+}
+
+impl<C: ColorModel> RawConstant<C> {
+    pub(super) fn build(properties: &Properties<'_>, palette: &Palette<C>) -> Result<Self> {
+        let value = match properties.value("value") {
+            None => return Err(properties.error("value", "a rawconstant needs a value")),
+            Some(Property {
+                value: Value::Vector(v),
+                ..
+            }) => Color::Rgb(v.to_array()),
+            Some(_) => Color::Grey(properties.float("value")?.expect("the property is there")),
+        };
+        let stored = palette.color.store(&value, Role::Quantity);
+        stored
+            .map(|value| Self { value })
+            .map_err(|e| properties.error("value", e))
+    }
+}
+
+impl<C: ColorModel> Pattern<C> for RawConstant<C> {
+    fn eval(&self, _at: &Interaction<'_>, wavelengths: &C::Wavelengths) -> C::Sample {
+        C::evaluate(&self.value, wavelengths)
+    }
+}
