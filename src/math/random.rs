@@ -3,6 +3,10 @@
 //! SplitMix64 (Steele, Lea and Flood, *Fast splittable pseudorandom number generators*, 2014, with
 //! Stafford's "variant 13" constants); numbers along a key are the SplitMix64 sequence that starts there.
 
+use std::convert::Infallible;
+
+use rand::TryRng;
+
 /// The golden ratio's fraction in 64 bits, SplitMix64's step.
 const STEP: u64 = 0x9e37_79b9_7f4a_7c15;
 
@@ -66,6 +70,45 @@ pub fn permute(mut i: u32, n: u32, key: u64) -> u32 {
         if i < n {
             return (((u64::from(i)) + u64::from(p)) % u64::from(n)) as u32;
         }
+    }
+}
+
+/// The numbers along a key one after another, for `rand`'s distributions where order is no matter: the
+/// shapes of generated meshes, never a path to a pixel.
+#[derive(Clone, Debug)]
+pub struct Sequence {
+    key: u64,
+    next: u32,
+}
+
+impl Sequence {
+    /// From the start.
+    pub fn new(seed: u64) -> Self {
+        Self {
+            key: key(0, seed),
+            next: 0,
+        }
+    }
+}
+
+impl TryRng for Sequence {
+    type Error = Infallible;
+
+    fn try_next_u32(&mut self) -> Result<u32, Infallible> {
+        Ok((self.try_next_u64()? >> 32) as u32)
+    }
+
+    fn try_next_u64(&mut self) -> Result<u64, Infallible> {
+        self.next = self.next.wrapping_add(1);
+        Ok(bits(self.key, self.next))
+    }
+
+    fn try_fill_bytes(&mut self, dst: &mut [u8]) -> Result<(), Infallible> {
+        for chunk in dst.chunks_mut(8) {
+            let bytes = self.try_next_u64()?.to_le_bytes();
+            chunk.copy_from_slice(&bytes[..chunk.len()]);
+        }
+        Ok(())
     }
 }
 

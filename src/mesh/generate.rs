@@ -5,8 +5,10 @@ use std::collections::HashMap;
 use std::f64::consts::PI;
 
 use glam::{DVec2, DVec3, Vec2, Vec3};
+use rand::RngExt;
 
 use super::Mesh;
+use crate::math::random;
 
 /// [−1, 1]² at z = 0, facing +Z, with uv = (p + 1) / 2: two triangles.
 pub fn rectangle() -> Mesh {
@@ -184,15 +186,8 @@ struct Wave {
 impl Wave {
     /// Twelve waves of growing frequency, with amplitudes that add up to less than a half.
     fn all(seed: u64) -> Vec<Self> {
-        let mut state = seed;
-        // splitmix64 (Steele, Lea and Flood, 2014), as a number in [−1, 1).
-        let mut random = || {
-            state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-            let mut z = state;
-            z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-            z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-            ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-        };
+        let mut numbers = random::Sequence::new(seed);
+        let mut random = || numbers.random_range(-1.0..1.0);
         let wave = |i: i32| {
             let frequency = 2.0 * 1.4_f64.powi(i);
             Self {

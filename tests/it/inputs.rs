@@ -48,6 +48,18 @@ const fn usage(
 }
 
 const CASES: &[Case] = &[
+    wrong(
+        "a second integrator",
+        r#"<integrator type="path"/>
+        <!--!--><integrator type="direct"/>"#,
+        &["scene \"scene\" has a second integrator", "the first is at"],
+    ),
+    wrong(
+        "a material and a shape at once",
+        r#"<shape type="teapot"/>
+        <!--!--><shape type="sphere"><bsdf type="difuse"/></shape>"#,
+        &["unknown shape \"teapot\"", "did you mean \"diffuse\"?"],
+    ),
     // ---- plugins
     wrong(
         "misspelt bsdf",

@@ -3,6 +3,7 @@
 
 mod support;
 
+mod channels;
 mod cli;
 mod closed_form;
 mod golden;
