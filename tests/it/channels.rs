@@ -31,8 +31,9 @@ fn value(image: &etendue::image::Image, channel: &str, x: u32, y: u32) -> f32 {
     image.get(x, y, index)
 }
 
+/// Equal to half a pixel, which is a tenth wide: samples lie anywhere in theirs.
 fn near(actual: f32, expected: f32) {
-    assert!((actual - expected).abs() < 0.03, "{actual} {expected}");
+    assert!((actual - expected).abs() < 0.05, "{actual} {expected}");
 }
 
 #[test]
