@@ -10,6 +10,7 @@
 
 mod generate;
 mod gltf;
+mod mtl;
 mod normals;
 mod obj;
 mod ply;
@@ -25,6 +26,7 @@ use rayon::prelude::*;
 
 pub use generate::{bumpy_sphere, cube, grid, rectangle, sphere};
 pub use gltf::{GltfCamera, GltfPart, GltfScene, Projection, read_gltf};
+pub use mtl::BARE_COLOR;
 pub use read::{FORMATS, Format, Loaded, ReadOptions, read};
 
 /// Triangles over shared vertices.

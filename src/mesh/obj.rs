@@ -2,15 +2,17 @@
 //! across them (`tobj` splits the file there, and reports neither lines nor missing indices: the tests use
 //! it to compare). Corners `v/vt/vn` that are equal share a vertex; vertices stand in the order in which
 //! faces first name them. Polygons are fans around their first corner; negative indices count back from
-//! the last; lines that are neither `v`, `vt`, `vn` nor `f` are passed over.
+//! the last; lines that are neither `v`, `vt`, `vn` nor `f` are passed over, but for those that name
+//! materials where they are asked for.
 
 use std::collections::HashMap;
 use std::path::Path;
 
 use glam::{Vec2, Vec3};
 
-use super::Mesh;
+use super::mtl::{BARE_COLOR, Materials, keyword};
 use super::read::{Decoded, Input, ReadOptions};
+use super::{Attribute, Mesh, Per};
 use crate::error::{Error, Location, Result};
 
 /// What a line gives, or what is wrong with it, in words.
@@ -37,7 +39,17 @@ pub(super) fn read(input: Input<'_>, options: &ReadOptions) -> Result<Decoded> {
         start += line.len() + 1;
     }
     check_text(&bytes, &obj, path)?;
-    Ok(obj.finish(options))
+    let colors = options.materials.then(|| obj.face_colors(path));
+    let mut decoded = obj.finish(options);
+    if let Some(FaceColors {
+        attribute,
+        warnings,
+    }) = colors
+    {
+        decoded.mesh.attributes.extend(attribute);
+        decoded.warnings.extend(warnings);
+    }
+    Ok(decoded)
 }
 
 /// Stands for the line end after a backslash: a blank that no file has otherwise.
@@ -89,6 +101,24 @@ struct Obj {
     triangles: Vec<[u32; 3]>,
     /// Faces of fewer than three corners.
     degenerate: usize,
+    /// What the `mtllib` lines name.
+    libraries: Vec<Vec<u8>>,
+    /// What the `usemtl` lines name, in the order of the triangles.
+    uses: Vec<Use>,
+}
+
+/// A material in use, until the next one.
+struct Use {
+    /// The first triangle that has it.
+    from: usize,
+    name: Vec<u8>,
+}
+
+/// What the materials of a file come to.
+struct FaceColors {
+    /// `None`: no face has a colour.
+    attribute: Option<Attribute>,
+    warnings: Vec<String>,
 }
 
 impl Obj {
@@ -108,6 +138,12 @@ impl Obj {
             }
             Some(b"vn") => self.normals.push(Vec3::from_array(numbers(&mut words, 3)?)),
             Some(b"f") => return self.face(words),
+            Some(b"mtllib") => self.libraries.push(keyword(line).1.to_vec()),
+            Some(b"usemtl") => {
+                let (from, name) = (self.triangles.len(), keyword(line).1.to_vec());
+                self.uses.pop_if(|last| last.from == from);
+                self.uses.push(Use { from, name });
+            }
             _ => {}
         }
         Ok(())
@@ -170,6 +206,38 @@ impl Obj {
             self.vertices.push(corner);
         }
         Ok(vertex)
+    }
+
+    /// The colour of each face's material, from the libraries beside the file `path`.
+    fn face_colors(&self, path: &Path) -> FaceColors {
+        let mut materials = Materials::read(path, &self.libraries);
+        let mut warnings = std::mem::take(&mut materials.warnings);
+        let unknown = (self.uses.iter()).find(|u| !u.name.is_empty() && !materials.has(&u.name));
+        if let (Some(Use { name, .. }), false) = (unknown, self.libraries.is_empty()) {
+            let name = shown(name);
+            warnings.push(format!("no library has the material {name}"));
+        }
+        let colors: Vec<_> = (self.uses.iter())
+            .map(|u| materials.color(&u.name))
+            .collect();
+        let attribute = colors.iter().any(Option::is_some).then(|| {
+            let mut values = BARE_COLOR.repeat(self.uses[0].from);
+            let ends = self.uses[1..].iter().map(|u| u.from);
+            let ends = ends.chain([self.triangles.len()]);
+            for ((u, color), end) in self.uses.iter().zip(colors).zip(ends) {
+                values.extend(color.unwrap_or(BARE_COLOR).repeat(end - u.from));
+            }
+            Attribute {
+                name: "face_color".to_owned(),
+                channels: 3,
+                per: Per::Face,
+                values,
+            }
+        });
+        FaceColors {
+            attribute,
+            warnings,
+        }
     }
 
     fn finish(self, options: &ReadOptions) -> Decoded {
@@ -307,6 +375,52 @@ mod tests {
         let mesh = mesh("v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0.5 0.5\nvn 0 1 0\nf 1//1 2/1 3\n");
         assert_eq!(mesh.normals, [Vec3::Y, Vec3::Z, Vec3::Z]);
         assert_eq!(mesh.uvs[1], Vec2::splat(0.5));
+    }
+
+    const SQUARES: &str = "mtllib one.mtl\nmtllib absent.mtl two.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n\
+        f 1 2 3\nusemtl red\nusemtl dark blue\nf 1 2 3 4\nusemtl red\nf 1 2 3\nf 2 3 4\nusemtl\nf 3 4 1\n";
+
+    /// `SQUARES` with these libraries, as read with its materials.
+    fn with_libraries(one: &str, two: &str) -> crate::mesh::Loaded {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("squares.obj");
+        std::fs::write(&path, SQUARES).unwrap();
+        std::fs::write(folder.path().join("one.mtl"), one).unwrap();
+        std::fs::write(folder.path().join("two.mtl"), two).unwrap();
+        let plain = crate::mesh::read(&path, &ReadOptions::default()).unwrap();
+        assert!(plain.mesh.attributes.is_empty() && plain.warnings.is_empty());
+        let options = ReadOptions {
+            materials: true,
+            ..ReadOptions::default()
+        };
+        crate::mesh::read(&path, &options).unwrap()
+    }
+
+    #[test]
+    fn each_face_has_the_colour_of_its_material() {
+        let blue =
+            "newmtl dark blue\nKd 0 0 0.5\nmap_Kd sky.png\nnewmtl red\nKd 0 1 0\nmap_Kd a.png\n";
+        let loaded = with_libraries("newmtl red\nKd 0.9 0.1 0.1\n", blue);
+        let (red, blue) = ([0.9, 0.1, 0.1], [0.0, 0.0, 0.5]);
+        let attribute = &loaded.mesh.attributes[0];
+        assert_eq!((attribute.channels, attribute.per), (3, Per::Face));
+        assert_eq!(attribute.name, "face_color");
+        let wanted = [BARE_COLOR, blue, blue, red, red, BARE_COLOR];
+        assert_eq!(attribute.values, wanted.concat());
+        let said: Vec<_> = loaded.warnings.iter().map(|w| w.to_string()).collect();
+        assert!(said[0].contains("absent.mtl cannot be read"), "{said:?}");
+        assert!(said[1].contains("map_Kd is not shown"), "{said:?}");
+        assert_eq!(said.len(), 2, "{said:?}");
+    }
+
+    #[test]
+    fn without_a_colour_in_use_there_is_no_attribute() {
+        let loaded = with_libraries("newmtl green\nKd 0 1 0\n", "newmtl red\nKd so red\n");
+        assert!(loaded.mesh.attributes.is_empty());
+        let said: Vec<_> = loaded.warnings.iter().map(|w| w.to_string()).collect();
+        assert!(said[1].contains("1 lines Kd passed over"), "{said:?}");
+        assert!(said[2].contains("no library has the material"), "{said:?}");
+        assert!(said[2].contains("dark blue"), "{said:?}");
     }
 
     #[test]

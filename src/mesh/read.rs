@@ -16,6 +16,9 @@ pub struct ReadOptions {
     pub flip_tex_coords: Option<bool>,
     /// Which of the meshes of a `serialized` file, from 0.
     pub shape_index: usize,
+    /// Whether an OBJ file's materials (`mtllib`, `usemtl`) give the mesh an attribute `face_color`: linear
+    /// RGB, [`BARE_COLOR`](super::BARE_COLOR) where a face has none. Without any colour there is no attribute.
+    pub materials: bool,
 }
 
 /// A mesh as read.

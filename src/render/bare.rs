@@ -1,5 +1,5 @@
 //! A bare mesh as a scene: framed by its own camera (glTF) or an automatic one, on a ground, under a soft sky
-//! and a key light, in the colours of its vertices or faces where the file has any.
+//! and a key light, in the colours of its vertices, faces or materials where the file has any.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use glam::{DMat4, DVec3, Vec3};
 
 use crate::description::{Description, Options};
 use crate::error::{Error, Result};
-use crate::mesh::{GltfCamera, Mesh, Projection, ReadOptions, read, read_gltf};
+use crate::mesh::{BARE_COLOR, GltfCamera, Mesh, Projection, ReadOptions, read, read_gltf};
 
 /// Which way is up in a mesh file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -51,7 +51,11 @@ pub fn describe_mesh(path: &Path, up: UpAxis, options: &Options) -> Result<Descr
             path.display()
         )));
     };
-    let loaded = read(path, &ReadOptions::default())?;
+    let read_options = ReadOptions {
+        materials: plugin == "obj",
+        ..ReadOptions::default()
+    };
+    let loaded = read(path, &read_options)?;
     let Some(bounds) = loaded.mesh.bounds() else {
         return Err(Error::input(format!(
             "{} holds no triangle",
@@ -63,7 +67,7 @@ pub fn describe_mesh(path: &Path, up: UpAxis, options: &Options) -> Result<Descr
         UpAxis::Z => Vec3::Z,
     };
     let camera = match plugin {
-        "gltf" => read_gltf(path, &ReadOptions::default())?.camera,
+        "gltf" => read_gltf(path, &read_options)?.camera,
         _ => None,
     };
     let text = scene(&Subject {
@@ -121,7 +125,10 @@ fn reflectance(mesh: &Mesh) -> String {
             r#"<texture name="reflectance" type="mesh_attribute"><string name="name" value="{}"/></texture>"#,
             attribute.name
         ),
-        None => r#"<rgb name="reflectance" value="0.65, 0.6, 0.52"/>"#.to_owned(),
+        None => {
+            let [r, g, b] = BARE_COLOR;
+            format!(r#"<rgb name="reflectance" value="{r}, {g}, {b}"/>"#)
+        }
     }
 }
 
@@ -201,7 +208,7 @@ fn scene(subject: &Subject<'_>) -> String {
     </shape>
     <shape type="{plugin}">
         <string name="filename" value="{file}"/>
-        <boolean name="face_normals" value="{flat}"/>
+        <boolean name="face_normals" value="{flat}"/>{materials}
         <bsdf type="twosided"><bsdf type="diffuse">{reflectance}</bsdf></bsdf>
     </shape>
 </scene>"#,
@@ -213,6 +220,10 @@ fn scene(subject: &Subject<'_>) -> String {
         front = point(front),
         // A glTF without normals is meant to be flat; other formats leave them to be computed.
         flat = plugin == "gltf" && subject.mesh.normals.is_empty(),
+        materials = match plugin {
+            "obj" => r#"<boolean name="materials" value="true"/>"#,
+            _ => "",
+        },
         reflectance = reflectance(subject.mesh),
     )
 }
@@ -272,5 +283,25 @@ mod tests {
         assert!(mesh(&describe("colored.gltf", GLTF)));
         let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
         assert!(!mesh(&describe("plain.obj", obj)));
+    }
+
+    #[test]
+    fn an_obj_file_shows_the_colours_of_its_materials() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("red.obj");
+        let obj = "mtllib red.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\n";
+        std::fs::write(&path, obj).unwrap();
+        let textures = || {
+            let scene = describe_mesh(&path, UpAxis::Y, &Options::default()).unwrap();
+            let shape = scene.root().children(Kind::Shape)[2];
+            assert_eq!(shape.boolean("materials").unwrap(), Some(true));
+            let diffuse = shape.children(Kind::Bsdf)[0].children(Kind::Bsdf)[0];
+            let textures = diffuse.children(Kind::Texture);
+            let plugins = textures.iter().map(|t| t.plugin().to_owned());
+            plugins.collect::<Vec<_>>()
+        };
+        assert!(textures().is_empty());
+        std::fs::write(folder.path().join("red.mtl"), "newmtl red\nKd 1 0 0\n").unwrap();
+        assert_eq!(textures(), ["mesh_attribute"]);
     }
 }

@@ -1,5 +1,6 @@
 //! `obj`: a mesh in Wavefront's text format, from `filename`, with `to_world`, `face_normals`,
-//! `flip_normals` and `flip_tex_coords`.
+//! `flip_normals` and `flip_tex_coords`; with Étendue's own `materials` (false), the colours of the materials that
+//! the file names are its attribute `face_color`.
 
 use super::{Shape, mesh};
 use crate::description::Properties;
@@ -7,5 +8,12 @@ use crate::error::Result;
 use crate::mesh::ReadOptions;
 
 pub(super) fn build(properties: &Properties<'_>) -> Result<Shape> {
-    mesh::load(properties, ReadOptions::default())
+    let materials = properties.boolean("materials")?.unwrap_or(false);
+    mesh::load(
+        properties,
+        ReadOptions {
+            materials,
+            ..ReadOptions::default()
+        },
+    )
 }
