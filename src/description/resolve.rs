@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::reader::{MAX_DEPTH, Reader};
 use super::report::{CANDIDATES, Report};
-use super::{Node, NodeId, Value};
+use super::{Kind, Node, NodeId, Value};
 use crate::error::Error;
 
 /// A `<ref>` whose target is not known yet.
@@ -68,6 +68,9 @@ pub(super) fn duplicates(nodes: &[Node], report: &mut Report) {
     }
 }
 
+/// The most nodes that a material or a texture may stand for.
+const MAX_PARTS: u64 = 1 << 12;
+
 /// Notes nodes that contain themselves and nodes nested more deeply than [`MAX_DEPTH`]; what is built from the nodes
 /// may then safely recurse.
 pub(super) fn nesting(nodes: &[Node], report: &mut Report) {
@@ -127,6 +130,38 @@ pub(super) fn nesting(nodes: &[Node], report: &mut Report) {
             return;
         }
     }
+}
+
+/// Notes the first material or texture that stands for more than [`MAX_PARTS`] nodes once every reference is followed:
+/// each use of a node builds it anew, so that a chain of double references would double at every link. The nodes must
+/// have passed [`nesting`].
+pub(super) fn expansion(nodes: &[Node], report: &mut Report) {
+    let mut known = vec![0; nodes.len()];
+    for (index, node) in nodes.iter().enumerate() {
+        let is_value = matches!(node.kind, Kind::Bsdf | Kind::Texture);
+        if is_value && parts(nodes, index, &mut known) > MAX_PARTS {
+            let message = format!(
+                "{} stands for more than {MAX_PARTS} nested objects through references",
+                describe(node)
+            );
+            report.push(Error::input(message).at(&node.location));
+            return;
+        }
+    }
+}
+
+/// How many nodes `index` stands for, itself included; `known` holds those that were counted, else 0.
+fn parts(nodes: &[Node], index: usize, known: &mut [u64]) -> u64 {
+    if known[index] == 0 {
+        let mut sum: u64 = 1;
+        for property in &nodes[index].properties {
+            if let Value::Object(child) = property.value {
+                sum = sum.saturating_add(parts(nodes, child.index(), known));
+            }
+        }
+        known[index] = sum;
+    }
+    known[index]
 }
 
 fn describe(node: &Node) -> String {

@@ -4,7 +4,7 @@
 use glam::{Vec2, Vec3};
 
 use super::ior::Complex;
-use super::{Bsdf, BsdfSample, BsdfValue, Lobes, fresnel};
+use super::{Bsdf, BsdfSample, Lobes, fresnel};
 use crate::color::{Color, ColorModel, Role};
 use crate::description::Properties;
 use crate::error::Result;
@@ -35,16 +35,6 @@ impl<C: ColorModel> Conductor<C> {
 impl<C: ColorModel> Bsdf<C> for Conductor<C> {
     fn lobes(&self) -> Lobes {
         Lobes::MIRROR
-    }
-
-    fn eval(
-        &self,
-        _at: &Interaction<'_>,
-        _wi: Vec3,
-        _wo: Vec3,
-        _w: &C::Wavelengths,
-    ) -> Option<BsdfValue<C::Sample>> {
-        None
     }
 
     fn sample(

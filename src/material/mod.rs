@@ -117,14 +117,16 @@ pub trait Bsdf<C: ColorModel>: std::fmt::Debug + Send + Sync {
         self.lobes().smooth
     }
 
-    /// The value and density of a pair of directions.
+    /// The value and density of a pair of directions; none where all lobes are single directions.
     fn eval(
         &self,
-        at: &Interaction<'_>,
-        wi: Vec3,
-        wo: Vec3,
-        wavelengths: &C::Wavelengths,
-    ) -> Option<BsdfValue<C::Sample>>;
+        _at: &Interaction<'_>,
+        _wi: Vec3,
+        _wo: Vec3,
+        _wavelengths: &C::Wavelengths,
+    ) -> Option<BsdfValue<C::Sample>> {
+        None
+    }
 
     /// The diffuse reflectance, for the channel that shows it: π·f seen and lit along the normal.
     fn albedo(&self, at: &Interaction<'_>, wavelengths: &C::Wavelengths) -> C::Sample {

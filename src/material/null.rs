@@ -2,7 +2,7 @@
 
 use glam::{Vec2, Vec3};
 
-use super::{Bsdf, BsdfSample, BsdfValue, Lobes};
+use super::{Bsdf, BsdfSample, Lobes};
 use crate::color::{ColorModel, Spectral};
 use crate::description::Properties;
 use crate::error::Result;
@@ -28,16 +28,6 @@ impl<C: ColorModel> Bsdf<C> for Null {
             smooth: false,
             transmission: true,
         }
-    }
-
-    fn eval(
-        &self,
-        _at: &Interaction<'_>,
-        _wi: Vec3,
-        _wo: Vec3,
-        _w: &C::Wavelengths,
-    ) -> Option<BsdfValue<C::Sample>> {
-        None
     }
 
     fn sample(

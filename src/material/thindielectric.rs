@@ -5,7 +5,7 @@
 
 use glam::{Vec2, Vec3};
 
-use super::{Bsdf, BsdfSample, BsdfValue, Lobes, fresnel, ior};
+use super::{Bsdf, BsdfSample, Lobes, fresnel, ior};
 use crate::color::{Color, ColorModel, Role};
 use crate::description::Properties;
 use crate::error::Result;
@@ -43,16 +43,6 @@ impl<C: ColorModel> Bsdf<C> for ThinDielectric<C> {
             smooth: false,
             transmission: true,
         }
-    }
-
-    fn eval(
-        &self,
-        _at: &Interaction<'_>,
-        _wi: Vec3,
-        _wo: Vec3,
-        _w: &C::Wavelengths,
-    ) -> Option<BsdfValue<C::Sample>> {
-        None
     }
 
     fn sample(

@@ -1,7 +1,7 @@
 //! From a description and its loaded shapes to a scene: materials and lights are made from their properties,
 //! and all that is wrong is gathered before any of it is reported.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
 use super::assets::Member;
@@ -133,11 +133,14 @@ impl<C: ColorModel> Builder<'_, C> {
 pub fn check_materials<C: ColorModel>(description: &Description, color: C) -> Result<()> {
     let palettes = Palettes::new(color);
     let mut problems = Problems::default();
+    let mut seen = HashSet::new();
     let mut shapes = description.root().children(Kind::Shape);
     while let Some(shape) = shapes.pop() {
         shapes.extend(shape.children(Kind::Shape));
         for bsdf in shape.children(Kind::Bsdf) {
-            problems.take(Material::<C>::build(&bsdf, &palettes));
+            if seen.insert(bsdf.node_id()) {
+                problems.take(Material::<C>::build(&bsdf, &palettes));
+            }
         }
     }
     problems.finish()

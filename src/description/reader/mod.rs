@@ -93,6 +93,9 @@ impl<'o> Reader<'o> {
         if report.is_empty() {
             resolve::nesting(&self.nodes, &mut report);
         }
+        if report.is_empty() {
+            resolve::expansion(&self.nodes, &mut report);
+        }
         report.finish()?;
         Ok(Description {
             nodes: self.nodes,

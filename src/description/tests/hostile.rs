@@ -102,6 +102,26 @@ fn a_long_chain_of_references_is_refused_and_a_short_one_is_not() {
 }
 
 #[test]
+fn double_references_that_double_at_every_link_are_refused() {
+    let chain = |n: usize| {
+        let links: String = (0..n)
+            .map(|i| {
+                let next = i + 1;
+                format!(
+                    "<bsdf type='blendbsdf' id='b{i}'><ref id='b{next}'/><ref id='b{next}'/></bsdf>"
+                )
+            })
+            .collect();
+        parse(&format!(
+            "<scene version='3.0.0'>{links}<bsdf type='diffuse' id='b{n}'/></scene>"
+        ))
+    };
+    assert!(chain(10).is_ok());
+    let error = chain(50).unwrap_err().to_string();
+    assert!(error.contains("more than 4096 nested objects"), "{error}");
+}
+
+#[test]
 fn a_thousand_problems_are_not_all_listed() {
     let text = format!("<scene version='3.0.0'>{}</scene>", "<x/>\n".repeat(1000));
     let error = parse(&text).unwrap_err();
