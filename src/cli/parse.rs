@@ -47,6 +47,16 @@ pub(super) fn seconds(text: &str) -> Parsed<std::time::Duration> {
     Ok(std::time::Duration::from_secs_f64(seconds))
 }
 
+/// A positive number.
+pub(super) fn positive(text: &str) -> Parsed<f32> {
+    let number: f32 = text.parse().map_err(|_| "write a number")?;
+    if number > 0.0 && number.is_finite() {
+        Ok(number)
+    } else {
+        Err(format!("{text} is not positive"))
+    }
+}
+
 /// A number of bytes: `500M`, `8G`, `7.5GiB`; `none` is without limit.
 pub(super) fn bytes(text: &str) -> Parsed<u64> {
     if text == "none" {

@@ -9,7 +9,9 @@ use etendue::accel::Method;
 use etendue::description::{self, Description, Value};
 use etendue::display;
 use etendue::error::{Error, Problem, Result};
-use etendue::render::{Checkpoint, Colors, Options, Overrides, Rendered, Session, is_mesh};
+use etendue::render::{
+    Adaptive, Checkpoint, Colors, Options, Overrides, Rendered, Session, is_mesh,
+};
 use etendue::sensor::Window;
 use glam::DMat4;
 
@@ -69,6 +71,17 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=32), help_heading = IMAGE)]
     bands: Option<u8>,
 
+    /// Sample each part of the image until its noise is below T: the standard error of a pixel's luminance L,
+    /// divided by the square root of L. EXR gets the channels "samples" and "error"
+    #[arg(long, value_name = "T", value_parser = parse::positive, conflicts_with = "spp", help_heading = ADAPTIVE)]
+    noise_threshold: Option<f32>,
+    /// The fewest samples a pixel; more where the sampler's sets are larger
+    #[arg(long, default_value_t = 32, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 24), requires = "noise_threshold", help_heading = ADAPTIVE)]
+    min_spp: u32,
+    /// The most samples a pixel; more where the sampler's sets are larger
+    #[arg(long, default_value_t = 4096, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 24), requires = "noise_threshold", help_heading = ADAPTIVE)]
+    max_spp: u32,
+
     /// Render frames START up to, and without, END; each defines $frame
     #[arg(long, value_name = "START:END[:STEP]", value_parser = parse::frames, allow_hyphen_values = true, help_heading = SERIES)]
     frames: Option<Frames>,
@@ -113,6 +126,7 @@ pub(super) struct Arguments {
 }
 
 const IMAGE: &str = "The image";
+const ADAPTIVE: &str = "Adaptive sampling";
 const SERIES: &str = "Series of images";
 const RUN: &str = "The run";
 const TELL: &str = "What is told";
@@ -125,6 +139,7 @@ Examples:
   etendue render scene.xml -o crop.exr --crop 100,80,64,64 --max-depth 2 -D spp=16
   etendue render dragon.ply -o out/{frame:03}.png --turntable 36
   etendue render walk.xml -o out/{frame:04}.exr --frames 0:240 -D body=body-{frame:04}.ply
+  etendue render room.xml -o room.exr --noise-threshold 0.01 --sampler sobol
   etendue render big.xml -o big.exr --checkpoint 300 --resume";
 
 /// How rays find shapes.
@@ -148,6 +163,11 @@ impl Arguments {
             seed: self.seed,
             threads: self.threads,
             colors: self.bands.map_or(Colors::Rgb, |n| Colors::Bands(n.into())),
+            adaptive: self.noise_threshold.map(|noise_threshold| Adaptive {
+                noise_threshold,
+                min_spp: self.min_spp.min(self.max_spp),
+                max_spp: self.max_spp,
+            }),
             method: match self.accel {
                 Accel::Brute => Method::Brute,
                 Accel::Tree => Method::Tree,

@@ -111,10 +111,20 @@ fn object(item: &Item, ending: &Ending, total: Duration) -> Value {
 
 fn line(path: &Path, report: &Report, total: Duration) {
     let [width, height] = report.size;
+    let samples = match &report.adaptive {
+        None => format!("{} samples a pixel", report.completed.samples),
+        Some(adaptive) => {
+            let (mean, [least, most]) = (adaptive.mean_spp, adaptive.limits);
+            let mut samples = format!("{mean:.1} samples a pixel, {least} to {most}");
+            if adaptive.at_limit > 0.0 {
+                samples += &format!(" ({:.1} % have all of them)", 100.0 * adaptive.at_limit);
+            }
+            samples
+        }
+    };
     output::line(&format!(
-        "{}: {width}×{height}, {} samples a pixel, {}",
+        "{}: {width}×{height}, {samples}, {}",
         path.display(),
-        report.completed.samples,
         human_duration(total)
     ));
 }

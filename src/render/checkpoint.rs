@@ -15,9 +15,8 @@ use serde::{Deserialize, Serialize};
 
 use super::fingerprint::Fingerprint;
 use super::options::Checkpoint;
-use super::sums::{Summed, Sums};
+use super::sums::{Accumulator, Summed, Tally};
 use crate::error::{Error, Problem, Result};
-use crate::integrator::Stats;
 
 impl Checkpoint {
     /// Removes the file, if there is one: the image is written, and there is nothing left to continue.
@@ -27,7 +26,7 @@ impl Checkpoint {
     }
 }
 
-const MARK: &[u8; 16] = b"etendue sums 1\r\n";
+const MARK: &[u8; 16] = b"etendue sums 2\r\n";
 /// No header is longer.
 const MAX_HEADER: u32 = 1 << 16;
 /// Sums converted at a time.
@@ -38,9 +37,7 @@ struct Header {
     fingerprint: Fingerprint,
     /// The first unit that is not in the sums.
     next: usize,
-    stats: Stats,
-    dropped: u64,
-    dropped_pixel: Option<[u32; 2]>,
+    tally: Tally,
     /// Seconds spent on rendering so far.
     seconds: f64,
 }
@@ -72,17 +69,20 @@ impl Keeper {
     }
 
     /// Fills `summed`, which is new, with what the file kept, if there is one and it is to be continued.
-    pub(super) fn resume(&mut self, summed: &mut Summed, units: usize) -> Result<()> {
+    pub(super) fn resume<A: Accumulator>(
+        &mut self,
+        summed: &mut Summed<A>,
+        units: usize,
+    ) -> Result<()> {
         let path = &self.checkpoint.path;
         if self.checkpoint.resume && path.exists() {
-            let header = load(path, &self.fingerprint, summed.sums.data_mut())?;
+            let (data, tally) = summed.sums.kept();
+            let header = load(path, &self.fingerprint, data)?;
             if header.next > units {
                 return Err(damaged(path, "it knows of more tiles than there are"));
             }
+            *tally = header.tally;
             summed.next = header.next;
-            summed.sums.stats = header.stats;
-            summed.sums.dropped = header.dropped;
-            summed.sums.dropped_pixel = header.dropped_pixel;
             self.earlier = header.seconds;
         }
         self.began = Instant::now();
@@ -96,7 +96,7 @@ impl Keeper {
     }
 
     /// Writes the file when it is time.
-    pub(super) fn keep_when_due(&mut self, summed: &Summed) {
+    pub(super) fn keep_when_due<A: Accumulator>(&mut self, summed: &Summed<A>) {
         if let Some(every) = self.checkpoint.every
             && self.written.elapsed() >= every
         {
@@ -106,22 +106,20 @@ impl Keeper {
 
     /// After the last unit of a render that was stopped. That of a whole one stays as it is until its image
     /// is written: see [`Checkpoint::remove`].
-    pub(super) fn finish(&mut self, summed: &Summed, whole: bool) {
+    pub(super) fn finish<A: Accumulator>(&mut self, summed: &Summed<A>, whole: bool) {
         if !whole {
             self.keep(summed);
         }
     }
 
-    fn keep(&mut self, summed: &Summed) {
+    fn keep<A: Accumulator>(&mut self, summed: &Summed<A>) {
         let header = Header {
             fingerprint: self.fingerprint.clone(),
             next: summed.next,
-            stats: summed.sums.stats,
-            dropped: summed.sums.dropped,
-            dropped_pixel: summed.sums.dropped_pixel,
+            tally: *summed.sums.tally(),
             seconds: self.seconds(),
         };
-        self.failure = save(&self.checkpoint.path, &header, &summed.sums).err();
+        self.failure = save(&self.checkpoint.path, &header, summed.sums.data()).err();
         self.written = Instant::now();
     }
 
@@ -141,7 +139,7 @@ fn beside(path: &Path) -> PathBuf {
     name.into()
 }
 
-fn save(path: &Path, header: &Header, sums: &Sums) -> io::Result<()> {
+fn save(path: &Path, header: &Header, data: &[f64]) -> io::Result<()> {
     let new = beside(path);
     let mut out = Hashing {
         inner: File::create(&new)?,
@@ -152,7 +150,7 @@ fn save(path: &Path, header: &Header, sums: &Sums) -> io::Result<()> {
     out.write_all(&(json.len() as u32).to_le_bytes())?;
     out.write_all(&json)?;
     let mut bytes = Vec::with_capacity(8 * CHUNK);
-    for chunk in sums.data().chunks(CHUNK) {
+    for chunk in data.chunks(CHUNK) {
         bytes.clear();
         bytes.extend(chunk.iter().flat_map(|x| x.to_le_bytes()));
         out.write_all(&bytes)?;

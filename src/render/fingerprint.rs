@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use blake3::Hasher;
 use serde::{Deserialize, Serialize};
 
+use super::blocks::BLOCK;
 use super::options::{Colors, Options};
 use super::plan::{PASS, TILE};
 use crate::description::{Canonical, Description, NodeId, Part};
@@ -50,8 +51,8 @@ impl Fingerprint {
             Colors::Bands(n) => n,
         };
         let settings = format!(
-            "seed {} bands {bands} tile {TILE} pass {PASS}",
-            options.seed
+            "seed {} bands {bands} tile {TILE} pass {PASS} block {BLOCK} {:?}",
+            options.seed, options.adaptive
         );
         Ok(Self {
             version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -84,7 +85,7 @@ impl Fingerprint {
             (
                 &self.settings,
                 &other.settings,
-                "a setting (the seed or the bands)",
+                "a setting (the seed, the bands or the noise threshold and its limits)",
             ),
         ]
         .into_iter()

@@ -6,6 +6,7 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
+use super::blocks::Grid;
 use crate::description::{Canonical, Description, Part};
 use crate::error::{Error, Result};
 use crate::sensor::Film;
@@ -28,7 +29,12 @@ pub(super) struct Estimate {
 }
 
 /// The film's share for `channels` values a pixel.
-pub(super) fn film(film: &Film, channels: usize) -> u64 {
+pub(super) fn film(film: &Film, channels: usize, adaptive: bool) -> u64 {
+    if adaptive {
+        // Beside the blocks, each half stands as a film before they are added.
+        let blocks = Grid::new(film, channels).bytes();
+        return blocks.saturating_add(3 * self::film(film, channels + 2, false));
+    }
     let pixels = u64::from(film.crop.width) * u64::from(film.crop.height);
     let (sums, image) = (8 * (channels as u64 + 1), 4 * channels as u64);
     // The image stands once as samples and once as the bytes of its file.
@@ -154,7 +160,7 @@ mod tests {
     #[test]
     fn the_film_takes_what_its_sums_and_its_image_take() {
         let film_of = Film::default();
-        assert_eq!(film(&film_of, 4), 768 * 576 * (5 * 8 + 2 * 4 * 4));
+        assert_eq!(film(&film_of, 4, false), 768 * 576 * (5 * 8 + 2 * 4 * 4));
     }
 
     #[test]

@@ -5,7 +5,9 @@
 mod options;
 mod progress;
 
+mod adaptive;
 mod bare;
+mod blocks;
 mod check;
 mod checkpoint;
 mod fingerprint;
@@ -13,8 +15,10 @@ mod info;
 mod memory;
 mod plan;
 mod prepare;
+mod samples;
 mod session;
 mod sums;
+mod uniform;
 mod unit;
 
 use std::time::{Duration, Instant};
@@ -26,11 +30,12 @@ use crate::error::{Problem, Result};
 use crate::image::{Image, Metadata, Window};
 use crate::integrator::Stats;
 
+pub use adaptive::AdaptiveReport;
 pub use bare::{UpAxis, describe_mesh, is_mesh};
 pub use check::check;
 pub use info::{NamedFile, SceneInfo, SensorInfo};
 pub use memory::human_bytes;
-pub use options::{Checkpoint, Colors, Options, Overrides};
+pub use options::{Adaptive, Checkpoint, Colors, Options, Overrides};
 pub use plan::Completed;
 pub use progress::{Phase, Progress, Silent};
 pub use session::Session;
@@ -55,8 +60,11 @@ pub struct Rendered {
 pub struct Report {
     /// Pixels across and down.
     pub size: [u32; 2],
-    /// Samples a pixel.
+    /// Samples a pixel; on average where sampling is adaptive.
     pub spp: u32,
+    /// Where samples went, if sampling is adaptive.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub adaptive: Option<AdaptiveReport>,
     /// How much of it is done: all, unless the render was stopped.
     pub completed: Completed,
     /// Seed of the random numbers.

@@ -29,6 +29,18 @@ pub struct Checkpoint {
     pub resume: bool,
 }
 
+/// As many samples in each part of the image as its noise asks for, in place of the scene's number.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Adaptive {
+    /// The standard error of a pixel's luminance L that is aimed at, in proportion to √L; where L is below
+    /// 0.01, to 0.1. Positive.
+    pub noise_threshold: f32,
+    /// The fewest samples that a pixel gets; whole sets of the sampler may be more.
+    pub min_spp: u32,
+    /// The most samples that a pixel gets; whole sets of the sampler may be more.
+    pub max_spp: u32,
+}
+
 /// Settings of a run, which no scene file knows.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
@@ -40,6 +52,8 @@ pub struct Options {
     pub threads: Option<NonZeroUsize>,
     /// RGB or bands.
     pub colors: Colors,
+    /// Where samples go; the same number to every pixel where absent.
+    pub adaptive: Option<Adaptive>,
     /// Tree or brute force.
     pub method: Method,
     /// Which of the scene's sensors, in file order from 0.

@@ -203,7 +203,8 @@ pub(super) fn prepare<'k, C: ColorModel>(
     let sensor = problems.take(sensor(description, options));
     let view = sensor.and_then(|sensor| problems.take(view::<C>(description, sensor)));
     let film = view.as_ref().map_or(0, |view| {
-        memory::film(&view.film, channels(&color, &view.integrator).len())
+        let channels = channels(&color, &view.integrator).len();
+        memory::film(&view.film, channels, options.adaptive.is_some())
     });
     if kept.as_ref().is_some_and(|kept| kept.key == key) {
         // The equal scene was built from the equal properties, all of them.
@@ -308,6 +309,7 @@ impl<C: ColorModel> Job<'_, C> {
         Report {
             size: [crop.width, crop.height],
             spp: self.view.sampler.sample_count(),
+            adaptive: None,
             completed,
             seed: self.seed,
             threads: rayon::current_num_threads(),
@@ -324,7 +326,7 @@ impl<C: ColorModel> Job<'_, C> {
     /// How the image was made.
     pub(super) fn metadata(&self, scene_name: &str, report: &Report) -> Metadata {
         let to_camera = self.view.sensor.world_to_camera();
-        Metadata::default()
+        let metadata = Metadata::default()
             .with("software", concat!("etendue ", env!("CARGO_PKG_VERSION")))
             .with("scene", scene_name)
             .with("integrator", self.view.integrator_name.as_str())
@@ -332,6 +334,13 @@ impl<C: ColorModel> Job<'_, C> {
             .with("samples_complete", report.completed.samples)
             .with("seed", i64::try_from(report.seed).unwrap_or(i64::MAX))
             .with("world_to_camera", to_camera)
-            .with("world_to_ndc", self.view.sensor.projection() * to_camera)
+            .with("world_to_ndc", self.view.sensor.projection() * to_camera);
+        match &report.adaptive {
+            None => metadata,
+            Some(adaptive) => metadata
+                .with("noise_threshold", adaptive.noise_threshold)
+                .with("min_spp", adaptive.limits[0])
+                .with("max_spp", adaptive.limits[1]),
+        }
     }
 }

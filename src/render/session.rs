@@ -6,18 +6,19 @@ use std::num::NonZeroUsize;
 
 use rayon::ThreadPool;
 
+use super::adaptive::{self, AdaptiveReport};
 use super::checkpoint::Keeper;
-use super::options::{Colors, Options};
-use super::plan::Plan;
-use super::prepare::{self, Facts, Kept};
+use super::options::{Adaptive, Colors, Options};
+use super::plan::Completed;
+use super::prepare::{self, Facts, Job, Kept};
 use super::progress::Progress;
-use super::sums::Summed;
-use super::sums::Sums;
-use super::unit;
+use super::sums::{Accumulator, Tally};
+use super::uniform;
 use super::{Rendered, Seconds, timed};
 use crate::color::{Bands, ColorModel, Rgb};
 use crate::description::Description;
 use crate::error::{Error, Result};
+use crate::image::Image;
 use crate::shape::Bounds;
 
 /// Renders that follow one another; see the module.
@@ -99,36 +100,39 @@ impl Task for Render<'_> {
             progress,
         } = self.0;
         let job = prepare::prepare(kept, description, options, color, progress)?;
-        let plan = Plan::new(&job.view.film, job.view.sampler.sample_count());
-        let mut summed = Summed {
-            sums: Sums::try_new(job.view.film.crop, job.channels())?,
-            next: 0,
+        let mut keeper = match &options.checkpoint {
+            Some(checkpoint) => {
+                let fingerprint = job.fingerprint(description, options)?;
+                Some(Keeper::new(checkpoint.clone(), fingerprint))
+            }
+            None => None,
         };
-        let mut keeper = None;
-        if let Some(checkpoint) = &options.checkpoint {
-            let fingerprint = job.fingerprint(description, options)?;
-            let keeper = keeper.insert(Keeper::new(checkpoint.clone(), fingerprint));
-            keeper.resume(&mut summed, plan.units())?;
-        }
         let mut seconds = job.spent;
-        let summed = timed(&mut seconds.render, || {
-            unit::run(&job, &plan, summed, progress, keeper.as_mut())
-        });
-        let completed = plan.completed(summed.next);
+        let Finished {
+            image,
+            completed,
+            tally,
+            adaptive,
+        } = timed(&mut seconds.render, || match &options.adaptive {
+            None => Finished::uniform(&job, progress, keeper.as_mut()),
+            Some(adaptive) => Finished::adaptive(&job, adaptive, progress, keeper.as_mut()),
+        })?;
         let mut warnings = job.warnings.clone();
-        if let Some(keeper) = &mut keeper {
+        if let Some(keeper) = &keeper {
             seconds.render = keeper.seconds();
-            keeper.finish(&summed, completed.is_whole());
             warnings.extend(keeper.warning());
         }
-        let Summed { sums, .. } = summed;
         let mut report = job.report(completed, seconds);
-        report.stats = sums.stats;
-        report.dropped_samples = sums.dropped;
-        report.dropped_pixel = sums.dropped_pixel;
-        warnings.extend(sums.warning());
+        if let Some(adaptive) = adaptive {
+            report.spp = adaptive.mean_spp.round() as u32;
+            report.adaptive = Some(adaptive);
+        }
+        report.stats = tally.stats;
+        report.dropped_samples = tally.dropped;
+        report.dropped_pixel = tally.dropped_pixel;
+        warnings.extend(tally.warning());
         let rendered = Rendered {
-            image: sums.develop(&job.view.film)?,
+            image,
             window: job.window(),
             metadata: job.metadata(&options.scene, &report),
             report,
@@ -138,6 +142,53 @@ impl Task for Render<'_> {
             kept.spent = Seconds::default();
         }
         Ok(rendered)
+    }
+}
+
+/// What samples came to.
+struct Finished {
+    image: Image,
+    completed: Completed,
+    tally: Tally,
+    adaptive: Option<AdaptiveReport>,
+}
+
+impl Finished {
+    fn uniform<C: ColorModel>(
+        job: &Job<'_, C>,
+        progress: &dyn Progress,
+        mut keeper: Option<&mut Keeper>,
+    ) -> Result<Self> {
+        let (summed, completed) = uniform::render(job, progress, keeper.as_deref_mut())?;
+        if let Some(keeper) = keeper {
+            keeper.finish(&summed, completed.is_whole());
+        }
+        Ok(Self {
+            image: summed.sums.develop(&job.view.film)?,
+            completed,
+            tally: summed.sums.tally,
+            adaptive: None,
+        })
+    }
+
+    fn adaptive<C: ColorModel>(
+        job: &Job<'_, C>,
+        adaptive: &Adaptive,
+        progress: &dyn Progress,
+        mut keeper: Option<&mut Keeper>,
+    ) -> Result<Self> {
+        let (summed, completed, ladder) =
+            adaptive::render(job, adaptive, progress, keeper.as_deref_mut())?;
+        if let Some(keeper) = keeper {
+            keeper.finish(&summed, completed.is_whole());
+        }
+        let blocks = &summed.sums;
+        Ok(Self {
+            image: adaptive::develop(job, blocks)?,
+            completed,
+            tally: *blocks.tally(),
+            adaptive: Some(adaptive::report(job, adaptive, &ladder, blocks)),
+        })
     }
 }
 

@@ -5,6 +5,8 @@
 //! pixel 0.40× (tent) or 0.30× (gaussian) of the variance that counting each sample once would. Where
 //! the film ends the filter is cut off, and the division by the sum of weights makes up for it.
 
+use serde::{Deserialize, Serialize};
+
 use crate::color::luminance;
 use crate::error::{Error, Problem, Result};
 use crate::filter::{Filter, MAX_RADIUS};
@@ -20,15 +22,9 @@ pub(super) fn border(filter: &Filter) -> u32 {
 /// The most pixels along an axis that a sample reaches.
 const MAX_REACH: usize = 2 * (MAX_RADIUS as usize + 1) + 1;
 
-/// Sums over a rectangle of pixels.
-#[derive(Clone, Debug)]
-pub(super) struct Sums {
-    window: Window,
-    /// Names of the values; the last one is opacity.
-    channels: Vec<String>,
-    /// For each pixel, row by row: the weight, then a value a channel.
-    data: Vec<f64>,
-    /// What it cost.
+/// What samples cost, and what came of them beside the sums.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+pub(super) struct Tally {
     pub(super) stats: Stats,
     /// Samples that were not finite.
     pub(super) dropped: u64,
@@ -36,126 +32,22 @@ pub(super) struct Sums {
     pub(super) dropped_pixel: Option<[u32; 2]>,
 }
 
-/// The film's sums after a number of units.
-#[derive(Debug)]
-pub(super) struct Summed {
-    pub(super) sums: Sums,
-    /// The first unit that is not in the sums.
-    pub(super) next: usize,
-}
-
-impl Sums {
-    /// Nothing yet.
-    pub(super) fn new(window: Window, channels: Vec<String>) -> Self {
-        let size = window.width as usize * window.height as usize * (channels.len() + 1);
-        Self {
-            window,
-            channels,
-            data: vec![0.0; size],
-            stats: Stats::default(),
-            dropped: 0,
-            dropped_pixel: None,
-        }
-    }
-
-    /// Nothing yet, unless the memory for it is not there.
-    pub(super) fn try_new(window: Window, channels: Vec<String>) -> Result<Self> {
-        let mut sums = Self::new(Window { width: 0, ..window }, channels);
-        sums.window = window;
-        let size = sums.len();
-        sums.data.try_reserve_exact(size).map_err(|_| {
-            Error::input(format!(
-                "a film of {} × {} pixels does not fit into memory",
-                window.width, window.height
-            ))
-            .help("render it in crops")
-        })?;
-        sums.data.resize(size, 0.0);
-        Ok(sums)
-    }
-
-    /// How many sums there are.
-    fn len(&self) -> usize {
-        self.window.width as usize * self.window.height as usize * (self.channels.len() + 1)
-    }
-
-    /// All sums, pixel by pixel.
-    pub(super) fn data(&self) -> &[f64] {
-        &self.data
-    }
-
-    /// The same, to be filled with what was kept.
-    pub(super) fn data_mut(&mut self) -> &mut [f64] {
-        &mut self.data
-    }
-
-    /// Adds a sample at `offset` (in [0, 1)²) within the pixel (x, y), in all pixels of the window that
-    /// its filter reaches.
-    pub(super) fn splat(
-        &mut self,
-        filter: &Filter,
-        [x, y]: [u32; 2],
-        offset: glam::Vec2,
-        values: &[f32],
-    ) {
-        if !values.iter().all(|v| v.is_finite()) {
-            self.dropped += 1;
-            self.dropped_pixel.get_or_insert([x, y]);
-            return;
-        }
-        let border = border(filter);
-        let center = Window {
-            x,
-            y,
-            width: 1,
-            height: 1,
-        };
-        let reached = center.grown(border, &self.window);
-        // One kernel value a column and a row; relative to the sample's own pixel, where f32 is exact.
-        let weight = |pixel: u32, own: u32, offset: f32| {
-            filter.eval((f64::from(pixel) - f64::from(own)) as f32 + 0.5 - offset)
-        };
-        let mut columns = [0.0; MAX_REACH];
-        for (column, px) in columns.iter_mut().zip(reached.x..reached.x + reached.width) {
-            *column = weight(px, x, offset.x);
-        }
-        let stride = self.channels.len() + 1;
-        for py in reached.y..reached.y + reached.height {
-            let wy = weight(py, y, offset.y);
-            for (px, wx) in (reached.x..reached.x + reached.width).zip(columns) {
-                let w = f64::from(wy * wx);
-                if w == 0.0 {
-                    continue;
-                }
-                let index = (py - self.window.y) as usize * self.window.width as usize
-                    + (px - self.window.x) as usize;
-                let pixel = &mut self.data[index * stride..(index + 1) * stride];
-                pixel[0] += w;
-                for (sum, value) in pixel[1..].iter_mut().zip(values) {
-                    *sum += w * f64::from(*value);
-                }
-            }
-        }
-    }
-
-    /// Adds another rectangle's sums where it overlaps this one.
+impl Tally {
+    /// Adds what came later.
     pub(super) fn add(&mut self, other: &Self) {
-        let stride = self.channels.len() + 1;
-        let (a, b) = (self.window, other.window);
-        let (left, right) = (a.x.max(b.x), (a.x + a.width).min(b.x + b.width));
-        for y in a.y.max(b.y)..(a.y + a.height).min(b.y + b.height) {
-            let start = |w: &Window| {
-                ((y - w.y) as usize * w.width as usize + (left - w.x) as usize) * stride
-            };
-            let count = right.saturating_sub(left) as usize * stride;
-            let target = &mut self.data[start(&a)..][..count];
-            for (sum, value) in target.iter_mut().zip(&other.data[start(&b)..][..count]) {
-                *sum += value;
-            }
-        }
         self.stats.add(&other.stats);
         self.dropped += other.dropped;
         self.dropped_pixel = self.dropped_pixel.or(other.dropped_pixel);
+    }
+
+    /// Whether a sample's values are finite; where they are not, it is counted as dropped.
+    pub(super) fn accepts(&mut self, pixel: [u32; 2], values: &[f32]) -> bool {
+        let finite = values.iter().all(|v| v.is_finite());
+        if !finite {
+            self.dropped += 1;
+            self.dropped_pixel.get_or_insert(pixel);
+        }
+        finite
     }
 
     /// The warning for dropped samples.
@@ -166,6 +58,145 @@ impl Sums {
             self.dropped
         );
         Some(Error::input(message).problems()[0].clone())
+    }
+}
+
+/// What units add up to.
+pub(super) trait Accumulator: Send {
+    /// What a unit comes to.
+    type Part: Send;
+
+    /// Adds a unit's part.
+    fn add(&mut self, part: &Self::Part);
+    /// What all of it cost.
+    fn tally(&self) -> &Tally;
+    /// All sums, as they are kept.
+    fn data(&self) -> &[f64];
+    /// The same, to be filled with what was kept.
+    fn kept(&mut self) -> (&mut [f64], &mut Tally);
+}
+
+/// The sums after a number of units.
+#[derive(Debug)]
+pub(super) struct Summed<A> {
+    pub(super) sums: A,
+    /// The first unit that is not in the sums.
+    pub(super) next: usize,
+}
+
+/// Sums over a rectangle of pixels.
+#[derive(Clone, Debug)]
+pub(super) struct Sums {
+    window: Window,
+    /// Names of the values; the last one is opacity.
+    channels: Vec<String>,
+    /// For each pixel, row by row: the weight, then a value a channel.
+    data: Vec<f64>,
+    pub(super) tally: Tally,
+}
+
+/// So many zeros, unless the memory for them is not there.
+pub(super) fn zeros(count: usize, film: &Window) -> Result<Vec<f64>> {
+    let mut data = Vec::new();
+    data.try_reserve_exact(count).map_err(|_| {
+        Error::input(format!(
+            "a film of {} × {} pixels does not fit into memory",
+            film.width, film.height
+        ))
+        .help("render it in crops")
+    })?;
+    data.resize(count, 0.0);
+    Ok(data)
+}
+
+impl Accumulator for Sums {
+    type Part = Self;
+
+    fn add(&mut self, part: &Self) {
+        self.add_rectangle(&part.window, &part.data, 1.0);
+        self.tally.add(&part.tally);
+    }
+
+    fn tally(&self) -> &Tally {
+        &self.tally
+    }
+
+    fn data(&self) -> &[f64] {
+        &self.data
+    }
+
+    fn kept(&mut self) -> (&mut [f64], &mut Tally) {
+        (&mut self.data, &mut self.tally)
+    }
+}
+
+impl Sums {
+    /// Nothing yet, unless the memory for it is not there.
+    pub(super) fn new(window: Window, channels: Vec<String>) -> Result<Self> {
+        let size = window.width as usize * window.height as usize * (channels.len() + 1);
+        Ok(Self {
+            window,
+            channels,
+            data: zeros(size, &window)?,
+            tally: Tally::default(),
+        })
+    }
+
+    /// Adds a sample at `offset` (in [0, 1)²) within the pixel, in all pixels of the window that its filter
+    /// reaches.
+    pub(super) fn splat(
+        &mut self,
+        filter: &Filter,
+        pixel: [u32; 2],
+        offset: glam::Vec2,
+        values: &[f32],
+    ) {
+        if self.tally.accepts(pixel, values) {
+            splat(
+                &mut self.data,
+                &self.window,
+                filter,
+                (pixel, offset),
+                values,
+            );
+        }
+    }
+
+    /// Adds the sums of another rectangle, times `scale`, where it overlaps this one.
+    pub(super) fn add_rectangle(&mut self, window: &Window, data: &[f64], scale: f64) {
+        let stride = self.channels.len() + 1;
+        let (a, b) = (&self.window, window);
+        let (left, right) = (a.x.max(b.x), (a.x + a.width).min(b.x + b.width));
+        if left >= right {
+            return;
+        }
+        let count = (right - left) as usize * stride;
+        for y in a.y.max(b.y)..(a.y + a.height).min(b.y + b.height) {
+            let start = |w: &Window| {
+                ((y - w.y) as usize * w.width as usize + (left - w.x) as usize) * stride
+            };
+            let (to, from) = (start(a), start(b));
+            for (sum, value) in self.data[to..][..count].iter_mut().zip(&data[from..]) {
+                *sum += value * scale;
+            }
+        }
+    }
+    /// Adds the sums of another part of the film, without what they cost.
+    pub(super) fn add_film(&mut self, other: &Self) {
+        self.add_rectangle(&other.window, &other.data, 1.0);
+    }
+
+    /// The luminance of a pixel of the window.
+    pub(super) fn luminance(&self, [x, y]: [u32; 2]) -> f64 {
+        let index = (y - self.window.y) as usize * self.window.width as usize
+            + (x - self.window.x) as usize;
+        let pixel = &self.data[index * (self.channels.len() + 1)..];
+        let value = |c: usize| (pixel[c + 1] / pixel[0]) as f32;
+        if pixel[0] > 0.0 {
+            luminance([value(0), value(1), value(2)]).into()
+        } else {
+            0.0
+        }
     }
 
     /// Divides by the weights.
@@ -192,5 +223,46 @@ impl Sums {
             data.extend((3..colors).map(value));
         }
         Image::from_data(self.window.width, self.window.height, names, data)
+    }
+}
+
+/// Adds an accepted sample to the sums over `window`: for each pixel, row by row, the weight and the values.
+pub(super) fn splat(
+    data: &mut [f64],
+    window: &Window,
+    filter: &Filter,
+    ([x, y], offset): ([u32; 2], glam::Vec2),
+    values: &[f32],
+) {
+    let center = Window {
+        x,
+        y,
+        width: 1,
+        height: 1,
+    };
+    let reached = center.grown(border(filter), window);
+    // One kernel value a column and a row; relative to the sample's own pixel, where f32 is exact.
+    let weight = |pixel: u32, own: u32, offset: f32| {
+        filter.eval((f64::from(pixel) - f64::from(own)) as f32 + 0.5 - offset)
+    };
+    let mut columns = [0.0; MAX_REACH];
+    for (column, px) in columns.iter_mut().zip(reached.x..reached.x + reached.width) {
+        *column = weight(px, x, offset.x);
+    }
+    let stride = values.len() + 1;
+    for py in reached.y..reached.y + reached.height {
+        let wy = weight(py, y, offset.y);
+        for (px, wx) in (reached.x..reached.x + reached.width).zip(columns) {
+            let w = f64::from(wy * wx);
+            if w == 0.0 {
+                continue;
+            }
+            let index = (py - window.y) as usize * window.width as usize + (px - window.x) as usize;
+            let pixel = &mut data[index * stride..(index + 1) * stride];
+            pixel[0] += w;
+            for (sum, value) in pixel[1..].iter_mut().zip(values) {
+                *sum += w * f64::from(*value);
+            }
+        }
     }
 }

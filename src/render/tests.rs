@@ -8,6 +8,7 @@ use std::time::Duration;
 use super::*;
 use crate::description;
 use crate::mesh::read;
+use crate::sensor::Window;
 
 /// A small scene; `%` stands for what the test changes.
 const SCENE: &str = "<scene version='3.0.0'>
@@ -101,33 +102,46 @@ impl Progress for Watch {
     }
 }
 
+const ADAPTIVE: Adaptive = Adaptive {
+    noise_threshold: 0.01,
+    min_spp: 16,
+    max_spp: 80,
+};
+
 #[test]
 fn a_render_that_is_stopped_again_and_again_ends_with_the_same_bits() {
-    let place = Place::new();
-    let scene = place.scene(SCENE);
-    let whole = render(&scene, &Options::default(), &Silent).unwrap();
-    assert!(whole.report.completed.is_whole());
-    let mut runs = 0;
-    let resumed = loop {
-        // Another number of threads each time, and a process of its own as far as the session goes.
-        let options = Options {
-            threads: std::num::NonZeroUsize::new(1 + runs % 3),
-            ..place.keeping()
+    for adaptive in [None, Some(ADAPTIVE)] {
+        let place = Place::new();
+        let scene = place.scene(SCENE);
+        let at_once = Options {
+            adaptive,
+            ..Options::default()
         };
-        let rendered = render(&scene, &options, &Watch::stopping_after(1)).unwrap();
-        runs += 1;
-        let completed = rendered.report.completed;
-        if completed.is_whole() {
-            options.checkpoint.unwrap().remove();
-            break rendered;
-        }
-        assert!(completed.units[0] > 0 && completed.samples < 40);
-        assert!(runs < 100, "every run goes on");
-    };
-    assert!(runs > 3, "{runs}");
-    assert_eq!(resumed.image, whole.image);
-    assert_eq!(resumed.report.stats, whole.report.stats);
-    assert_eq!(fs::read_dir(place.0.path()).unwrap().count(), 1);
+        let whole = render(&scene, &at_once, &Silent).unwrap();
+        assert!(whole.report.completed.is_whole());
+        let mut runs = 0;
+        let resumed = loop {
+            // Another number of threads each time, and a process of its own as far as the session goes.
+            let options = Options {
+                threads: std::num::NonZeroUsize::new(1 + runs % 3),
+                adaptive,
+                ..place.keeping()
+            };
+            let rendered = render(&scene, &options, &Watch::stopping_after(1)).unwrap();
+            runs += 1;
+            let completed = rendered.report.completed;
+            if completed.is_whole() {
+                options.checkpoint.unwrap().remove();
+                break rendered;
+            }
+            assert!(completed.units[0] > 0 && completed.samples < 40);
+            assert!(runs < 100, "every run goes on");
+        };
+        assert!(runs > 3, "{runs}");
+        assert_eq!(resumed.image, whole.image);
+        assert_eq!(resumed.report.stats, whole.report.stats);
+        assert_eq!(fs::read_dir(place.0.path()).unwrap().count(), 1);
+    }
 }
 
 #[test]
@@ -413,4 +427,53 @@ fn a_bare_mesh_is_in_the_middle_of_its_turntable() {
     let (low, high) = mesh.bounds().unwrap();
     let off = 0.5 * (bounds.min + bounds.max) - 0.5 * (low + high);
     assert!(off.x.abs() < 1e-3 && off.z.abs() < 1e-3, "{off}");
+}
+
+#[test]
+fn an_adaptive_crop_has_the_pixels_of_the_whole_and_more_samples_where_it_is_noisy() {
+    let place = Place::new();
+    let options = Options {
+        adaptive: Some(ADAPTIVE),
+        ..Options::default()
+    };
+    for sampler in crate::sampler::Sampler::NAMES {
+        let rendered = |crop| {
+            let mut scene = place.scene(SCENE);
+            let overrides = Overrides {
+                sampler: Some((*sampler).to_owned()),
+                crop,
+                ..Overrides::default()
+            };
+            overrides.apply(&mut scene);
+            render(&scene, &options, &Silent).unwrap()
+        };
+        let whole = rendered(None);
+        let report = whole.report.adaptive.clone().unwrap();
+        let image = &whole.image;
+        let [samples, error] = ["samples", "error"].map(|name| image.channel(name).unwrap());
+        // The sky has no noise; the sphere's lower half has.
+        let [sky, sphere] = [(4, 2), (35, 24)].map(|(x, y)| {
+            assert!(image.get(x, y, error) < 0.1);
+            image.get(x, y, samples) as u32
+        });
+        assert_eq!(sky, report.limits[0], "{sampler}");
+        assert!(sphere > sky, "{sampler}: {sphere}");
+        let mean = image.data().chunks_exact(image.channels().len());
+        let mean: f64 = mean.map(|p| f64::from(p[samples])).sum::<f64>() / (70.0 * 40.0);
+        assert!((mean - report.mean_spp).abs() < 1e-9, "{sampler}");
+        let (x, y, width, height) = (29, 17, 11, 15);
+        let crop = rendered(Some(Window {
+            x,
+            y,
+            width,
+            height,
+        }));
+        for (px, py) in (0..height).flat_map(|py| (0..width).map(move |px| (px, py))) {
+            assert_eq!(
+                crop.image.pixel(px, py),
+                image.pixel(x + px, y + py),
+                "{sampler}: {px}, {py}"
+            );
+        }
+    }
 }

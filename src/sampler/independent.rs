@@ -2,7 +2,7 @@
 
 use glam::Vec2;
 
-use super::{PointSet, sample_count};
+use super::{PointSet, Sampler, sample_count};
 use crate::description::Properties;
 use crate::error::Result;
 use crate::math::random;
@@ -29,6 +29,10 @@ impl PointSet for Independent {
 
     fn set_size(&self) -> u32 {
         1
+    }
+
+    fn sized(&self, count: u32) -> Sampler {
+        Sampler::Independent(Self { count })
     }
 
     #[inline]

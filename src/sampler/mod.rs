@@ -20,6 +20,8 @@ pub trait PointSet: std::fmt::Debug + Send + Sync {
     fn sample_count(&self) -> u32;
     /// How many points make a set.
     fn set_size(&self) -> u32;
+    /// The same sampler for about `count` samples a pixel, at least 1: its sets are as large as that allows.
+    fn sized(&self, count: u32) -> Sampler;
     /// Coordinate `dimension` of point `index` (counted over all sets of a pixel) in [0, 1); `key` is
     /// the pixel's.
     fn get_1d(&self, key: u64, index: u32, dimension: u32) -> f32;

@@ -4,7 +4,7 @@
 
 use glam::Vec2;
 
-use super::{PointSet, sample_count};
+use super::{PointSet, Sampler, sample_count};
 use crate::description::Properties;
 use crate::error::Result;
 use crate::math::random;
@@ -18,13 +18,17 @@ pub struct Stratified {
     jitter: bool,
 }
 
+/// The side of the smallest square of at least `count` cells.
+fn side(count: u32) -> u32 {
+    let side = count.isqrt();
+    side + u32::from(side.pow(2) < count)
+}
+
 impl Stratified {
     pub(super) fn build(properties: &Properties<'_>, _context: &()) -> Result<Self> {
         properties.ignore("seed"); // the render's seed is the command line's
-        let count = sample_count(properties)?;
-        let side = count.isqrt() + u32::from(count.isqrt().pow(2) < count);
         Ok(Self {
-            side,
+            side: side(sample_count(properties)?),
             jitter: properties.boolean("jitter")?.unwrap_or(true),
         })
     }
@@ -54,6 +58,11 @@ impl PointSet for Stratified {
 
     fn set_size(&self) -> u32 {
         self.side * self.side
+    }
+
+    fn sized(&self, count: u32) -> Sampler {
+        let side = side(count);
+        Sampler::Stratified(Self { side, ..*self })
     }
 
     #[inline]

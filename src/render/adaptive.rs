@@ -1,0 +1,475 @@
+//! Adaptive sampling: every block of 8 × 8 pixels gets as many samples as its noise asks for.
+//!
+//! A block's samples are two halves. Each begins with a pilot of four sets, scrambled independently; their
+//! spread is the noise, which holds for stratified points too, where the spread of single samples would
+//! not. What is seen in one half's pilot decides how many samples the *other* half gets: a number that
+//! depends on a half's own samples would bias their mean, and the image, toward what is dark where
+//! highlights are rare. For the same reason a pixel is the plain mean of its two halves, never weighted
+//! by their sizes. (Kirk and Arvo, *Unbiased sampling techniques for image synthesis*, 1991.)
+//!
+//! What follows the pilot is one set of the sampler's as large as is needed, from a ladder of sizes.
+
+use super::blocks::{Blocks, Grid, Record};
+use super::checkpoint::Keeper;
+use super::options::Adaptive;
+use super::plan::{Completed, PASS};
+use super::prepare::Job;
+use super::progress::{Phase, Progress};
+use super::samples::{self, Place, Sink};
+use super::sums::{Summed, Sums, Tally, splat};
+use super::unit;
+use crate::color::{ColorModel, luminance};
+use crate::error::{Error, Result};
+use crate::filter::Filter;
+use crate::image::Image;
+use crate::math::random;
+use crate::sampler::{Sampler, Stream};
+use crate::sensor::Window;
+
+/// Sets in a half's pilot.
+const SETS: u32 = 4;
+/// Steps of the ladder to a doubling.
+const STEPS: i32 = 4;
+/// Noise is relative to √L, but not where the luminance L is below this.
+const DARK: f64 = 0.01;
+
+/// The sets that halves may take.
+#[derive(Debug)]
+pub(super) struct Ladder {
+    /// What places the pilot.
+    pilot: Sampler,
+    /// Points of a set of the pilot.
+    set: u32,
+    /// What may follow, from small to large.
+    steps: Vec<Step>,
+    noise_threshold: f64,
+}
+
+#[derive(Debug)]
+struct Step {
+    sampler: Sampler,
+    /// Samples of each pixel.
+    count: u32,
+}
+
+impl Ladder {
+    /// The pilot and the largest step come to `min_spp` and `max_spp`, as far as the sampler's sets allow.
+    pub(super) fn new(sampler: &Sampler, adaptive: &Adaptive) -> Self {
+        let wanted = adaptive.min_spp.div_ceil(2 * SETS);
+        let pilot = sampler.sized(wanted);
+        let set = pilot.round_up(wanted);
+        let begun = SETS * set;
+        let rest = adaptive.max_spp.div_ceil(2).saturating_sub(begun);
+        let mut steps: Vec<Step> = Vec::new();
+        for i in 0.. {
+            let size = f64::from(begun) / 4.0 * 2f64.powf(f64::from(i) / f64::from(STEPS));
+            let size = (size.ceil() as u32).min(rest);
+            if size == 0 {
+                break;
+            }
+            let sampler = sampler.sized(size);
+            let count = sampler.round_up(size);
+            if steps.last().is_none_or(|last| count > last.count) {
+                steps.push(Step { sampler, count });
+            }
+            if size == rest {
+                break;
+            }
+        }
+        Self {
+            pilot,
+            set,
+            steps,
+            noise_threshold: adaptive.noise_threshold.into(),
+        }
+    }
+
+    /// Samples of each pixel in a half's pilot.
+    fn begun(&self) -> u32 {
+        SETS * self.set
+    }
+
+    /// The fewest and the most samples that a pixel can get.
+    pub(super) fn limits(&self) -> [u32; 2] {
+        let most = self.steps.last().map_or(0, |step| step.count);
+        [2 * self.begun(), 2 * (self.begun() + most)]
+    }
+
+    /// Samples of each pixel after the pilot, on step 0 none.
+    fn count(&self, step: usize) -> u32 {
+        step.checked_sub(1).map_or(0, |i| self.steps[i].count)
+    }
+
+    /// The step that brings the noise of a block, after two pilots, below the threshold.
+    fn step(&self, noise_squared: f64) -> usize {
+        let wanted = f64::from(self.begun()) * noise_squared / self.noise_threshold.powi(2);
+        let more = wanted - f64::from(self.begun());
+        if more <= 0.0 {
+            return 0;
+        }
+        let below = self
+            .steps
+            .partition_point(|step| f64::from(step.count) < more);
+        (below + 1).min(self.steps.len())
+    }
+}
+
+/// What an adaptive render came to, beside the image.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct AdaptiveReport {
+    /// The noise that was asked for.
+    pub noise_threshold: f32,
+    /// The fewest and the most samples that a pixel could get, in whole sets.
+    pub limits: [u32; 2],
+    /// Samples a pixel of the crop, on average.
+    pub mean_spp: f64,
+    /// The share of the crop's pixels that got as many samples as possible, and may be noisier.
+    pub at_limit: f64,
+}
+
+/// The part of a pixel's samples that a sample belongs to: each draws other numbers.
+fn stream(seed: u64, half: usize, after_pilot: bool, [x, y]: [u32; 2], index: u32) -> Stream {
+    let part = 1 + 2 * half as u64 + u64::from(after_pilot);
+    Stream::new(random::key(seed, part), x, y, index)
+}
+
+/// Renders the job's crop, going on from what `keeper` kept, until `progress` asks to stop.
+pub(super) fn render<C: ColorModel>(
+    job: &Job<'_, C>,
+    adaptive: &Adaptive,
+    progress: &dyn Progress,
+    mut keeper: Option<&mut Keeper>,
+) -> Result<(Summed<Blocks>, Completed, Ladder)> {
+    let ladder = Ladder::new(&job.view.sampler, adaptive);
+    let grid = Grid::new(&job.view.film, job.channels().len());
+    let passes = ladder.limits()[1].div_ceil(2 * PASS) as usize;
+    let pilots = grid.tiles();
+    let mut summed = Summed {
+        sums: Blocks::new(grid)?,
+        next: 0,
+    };
+    if let Some(keeper) = &mut keeper {
+        keeper.resume(&mut summed, pilots * (1 + passes))?;
+    }
+    let pixels = |block: usize| {
+        let own = grid.block(block);
+        u64::from(own.width) * u64::from(own.height)
+    };
+
+    let begun = u64::from(2 * ladder.begun());
+    let of_tile = |tile: usize| grid.tile(tile).map(pixels).sum::<u64>() * begun;
+    progress.begin(Phase::Render, (0..pilots).map(of_tile).sum());
+    progress.advance((0..pilots.min(summed.next)).map(of_tile).sum(), 0);
+    let mut summed = unit::run(pilots, summed, progress, keeper.as_deref_mut(), |tile| {
+        pilot(job, &ladder, &grid, tile, progress)
+    });
+    if summed.next < pilots {
+        let completed = Completed {
+            samples: 0,
+            passes: [0, 1 + passes as u32],
+            units: [summed.next, pilots + 1],
+        };
+        return Ok((summed, completed, ladder));
+    }
+
+    let rest = Rest::new(&grid, &ladder, summed.sums.steps());
+    let units = pilots + rest.units.len();
+    if summed.next > units {
+        return Err(Error::input(
+            "the checkpoint knows of more tiles than there are",
+        ));
+    }
+    let of_unit = |unit: usize| {
+        let slots = rest.slots(&grid, unit);
+        slots
+            .map(|(slot, indices)| pixels(slot / 2) * indices.len() as u64)
+            .sum::<u64>()
+    };
+    let done = summed.next - pilots;
+    progress.begin(Phase::Render, (0..rest.units.len()).map(of_unit).sum());
+    progress.advance((0..done).map(of_unit).sum(), 0);
+    summed = unit::run(units, summed, progress, keeper, |unit| {
+        rest.render(job, &ladder, &grid, unit - pilots, progress)
+    });
+    let pass_of = |unit: usize| rest.units.get(unit).map_or(rest.passes(), |u| u.pass);
+    let completed = Completed {
+        samples: ladder.limits()[0],
+        passes: [1 + pass_of(summed.next - pilots), 1 + rest.passes()],
+        units: [summed.next, units],
+    };
+    Ok((summed, completed, ladder))
+}
+
+/// The pilots of a tile's blocks, and what they decide.
+fn pilot<C: ColorModel>(
+    job: &Job<'_, C>,
+    ladder: &Ladder,
+    grid: &Grid,
+    tile: usize,
+    progress: &dyn Progress,
+) -> (Vec<Record>, Tally) {
+    let mut tally = Tally::default();
+    let mut records = Vec::new();
+    for block in grid.tile(tile) {
+        let halves = [0, 1].map(|half| {
+            let mut spread = Spread {
+                record: HalfBlock::new(job, grid, 2 * block + half),
+                set: ladder.set as usize,
+                seen: 0,
+                sets: Vec::new(),
+            };
+            let samples = pixels_of(grid.block(block)).flat_map(|pixel| {
+                (0..ladder.begun()).map(move |i| (pixel, stream(job.seed, half, false, pixel, i)))
+            });
+            samples::estimate(job, &ladder.pilot, samples, progress, &mut spread);
+            *spread.record.record.samples_mut() = ladder.begun().into();
+            spread
+        });
+        let steps = [1, 0].map(|other: usize| ladder.step(halves[other].noise_squared()));
+        for (half, step) in halves.into_iter().zip(steps) {
+            let HalfBlock {
+                mut record,
+                tally: cost,
+                ..
+            } = half.record;
+            *record.step_mut() = step as f64;
+            records.push(record);
+            tally.add(&cost);
+        }
+    }
+    (records, tally)
+}
+
+/// All samples after the pilots.
+struct Rest {
+    /// The step of each half of each block.
+    steps: Vec<usize>,
+    /// How many samples that is.
+    counts: Vec<u32>,
+    /// Tiles that are not done yet, pass by pass.
+    units: Vec<Unit>,
+}
+
+struct Unit {
+    pass: u32,
+    tile: usize,
+}
+
+impl Rest {
+    fn new(grid: &Grid, ladder: &Ladder, steps: Vec<usize>) -> Self {
+        let counts: Vec<u32> = steps.iter().map(|step| ladder.count(*step)).collect();
+        let most = |tile| {
+            let blocks = grid.tile(tile);
+            let counts = blocks.map(|b| counts[2 * b].max(counts[2 * b + 1]));
+            counts.max().unwrap_or(0)
+        };
+        let most: Vec<u32> = (0..grid.tiles()).map(most).collect();
+        let passes = most.iter().max().map_or(0, |n| n.div_ceil(PASS));
+        let units = (0..passes)
+            .flat_map(|pass| (0..grid.tiles()).map(move |tile| Unit { pass, tile }))
+            .filter(|unit| most[unit.tile] > unit.pass * PASS)
+            .collect();
+        Self {
+            steps,
+            counts,
+            units,
+        }
+    }
+
+    fn passes(&self) -> u32 {
+        self.units.last().map_or(0, |unit| unit.pass + 1)
+    }
+
+    /// The halves of blocks that a unit adds to, each with the indices of its samples.
+    fn slots(
+        &self,
+        grid: &Grid,
+        unit: usize,
+    ) -> impl Iterator<Item = (usize, std::ops::Range<u32>)> {
+        let Unit { pass, tile } = self.units[unit];
+        grid.tile(tile)
+            .flat_map(|block| [2 * block, 2 * block + 1])
+            .filter_map(move |slot| {
+                let first = pass * PASS;
+                let end = self.counts[slot].min(first + PASS);
+                (first < end).then_some((slot, first..end))
+            })
+    }
+
+    fn render<C: ColorModel>(
+        &self,
+        job: &Job<'_, C>,
+        ladder: &Ladder,
+        grid: &Grid,
+        unit: usize,
+        progress: &dyn Progress,
+    ) -> (Vec<Record>, Tally) {
+        let mut tally = Tally::default();
+        let mut records = Vec::new();
+        for (slot, indices) in self.slots(grid, unit) {
+            let sampler = &ladder.steps[self.steps[slot] - 1].sampler;
+            let mut sink = HalfBlock::new(job, grid, slot);
+            let count = indices.len() as u32;
+            let samples = pixels_of(grid.block(slot / 2)).flat_map(|pixel| {
+                let at = move |i| (pixel, stream(job.seed, slot % 2, true, pixel, i));
+                indices.clone().map(at)
+            });
+            samples::estimate(job, sampler, samples, progress, &mut sink);
+            *sink.record.samples_mut() = count.into();
+            tally.add(&sink.tally);
+            records.push(sink.record);
+        }
+        (records, tally)
+    }
+}
+
+fn pixels_of(window: Window) -> impl Iterator<Item = [u32; 2]> {
+    (window.y..window.y + window.height)
+        .flat_map(move |y| (window.x..window.x + window.width).map(move |x| [x, y]))
+}
+
+/// Adds samples to the sums of one half of a block.
+struct HalfBlock<'f> {
+    record: Record,
+    reach: Window,
+    filter: &'f Filter,
+    tally: Tally,
+}
+
+impl<'f> HalfBlock<'f> {
+    fn new<C: ColorModel>(job: &'f Job<'_, C>, grid: &Grid, slot: usize) -> Self {
+        Self {
+            record: Record::new(grid, slot),
+            reach: grid.reach(slot / 2),
+            filter: &job.view.film.filter,
+            tally: Tally::default(),
+        }
+    }
+}
+
+impl Sink for HalfBlock<'_> {
+    fn tally(&mut self) -> &mut Tally {
+        &mut self.tally
+    }
+
+    fn take(&mut self, place: &Place, channels: &[f32]) {
+        if self.tally.accepts(place.0, channels) {
+            let sums = self.record.sums_mut();
+            splat(sums, &self.reach, self.filter, *place, channels);
+        }
+    }
+}
+
+/// The same for a pilot, whose sets are also looked at one by one.
+struct Spread<'f> {
+    record: HalfBlock<'f>,
+    /// Points of a set.
+    set: usize,
+    seen: usize,
+    /// For each pixel and set the sum of luminances.
+    sets: Vec<f64>,
+}
+
+impl Sink for Spread<'_> {
+    fn tally(&mut self) -> &mut Tally {
+        self.record.tally()
+    }
+
+    fn take(&mut self, place: &Place, channels: &[f32]) {
+        if self.seen.is_multiple_of(self.set) {
+            self.sets.push(0.0);
+        }
+        self.seen += 1;
+        let y = luminance([channels[0], channels[1], channels[2]]);
+        if let Some(sum) = self.sets.last_mut()
+            && y.is_finite()
+        {
+            *sum += f64::from(y);
+        }
+        self.record.take(place, channels);
+    }
+}
+
+impl Spread<'_> {
+    /// The variance of the mean of two such pilots, averaged over the block's pixels and in proportion to
+    /// their luminance.
+    fn noise_squared(&self) -> f64 {
+        let n = f64::from(SETS);
+        let (mut variance, mut brightness) = (0.0, 0.0);
+        let pixels = self.sets.chunks_exact(SETS as usize);
+        let count = pixels.len() as f64;
+        for sets in pixels {
+            let mean = sets.iter().sum::<f64>() / n;
+            let squares: f64 = sets.iter().map(|s| (s - mean).powi(2)).sum();
+            variance += squares / ((n - 1.0) * n) / 2.0;
+            brightness += mean;
+        }
+        let size = self.set as f64;
+        let (variance, brightness) = (variance / (size * size), brightness / size);
+        variance / count / (brightness / count).max(DARK)
+    }
+}
+
+/// What was given to the crop's pixels.
+pub(super) fn report<C: ColorModel>(
+    job: &Job<'_, C>,
+    adaptive: &Adaptive,
+    ladder: &Ladder,
+    blocks: &Blocks,
+) -> AdaptiveReport {
+    let (crop, limits) = (&job.view.film.crop, ladder.limits());
+    let (mut samples, mut at_limit) = (0, 0);
+    for (own, count) in blocks.counts() {
+        let seen = own.grown(0, crop);
+        let pixels = u64::from(seen.width) * u64::from(seen.height);
+        samples += pixels * u64::from(count);
+        at_limit += if count == limits[1] { pixels } else { 0 };
+    }
+    let pixels = f64::from(crop.width) * f64::from(crop.height);
+    AdaptiveReport {
+        noise_threshold: adaptive.noise_threshold,
+        limits,
+        mean_spp: samples as f64 / pixels,
+        at_limit: at_limit as f64 / pixels,
+    }
+}
+
+/// The film, and beside its channels `samples`, how many samples each pixel got, and `error`, the standard
+/// error of its luminance: half the difference of the halves' images, as its root mean square over a block.
+pub(super) fn develop<C: ColorModel>(job: &Job<'_, C>, blocks: &Blocks) -> Result<Image> {
+    let film = &job.view.film;
+    let halves = blocks.halves(&job.channels())?;
+    let mut sums = Sums::new(film.crop, job.channels())?;
+    for half in &halves {
+        sums.add_film(half);
+    }
+    let image = sums.develop(film)?;
+    let mut names = image.channels().to_vec();
+    let old = names.len();
+    names.extend(["samples".to_owned(), "error".to_owned()]);
+    let mut data = Vec::with_capacity(image.data().len() / old * names.len());
+    for pixel in image.data().chunks_exact(old) {
+        data.extend_from_slice(pixel);
+        data.extend([0.0, 0.0]);
+    }
+    let crop = &film.crop;
+    for (own, samples) in blocks.counts() {
+        let seen = own.grown(0, crop);
+        if seen.width == 0 || seen.height == 0 {
+            continue;
+        }
+        let squares: f64 = pixels_of(own)
+            .map(|pixel| {
+                let [a, b] = [0, 1].map(|half| halves[half].luminance(pixel));
+                ((a - b) / 2.0).powi(2)
+            })
+            .sum();
+        let error = (squares / f64::from(own.width * own.height)).sqrt() as f32;
+        for [x, y] in pixels_of(seen) {
+            let i = ((y - crop.y) * crop.width + (x - crop.x)) as usize;
+            let pixel = &mut data[i * names.len()..][old..names.len()];
+            pixel.copy_from_slice(&[samples as f32, error]);
+        }
+    }
+    Image::from_data(crop.width, crop.height, names, data)
+}

@@ -1,0 +1,76 @@
+//! The same number of samples for every pixel: the tiles of each pass.
+
+use super::checkpoint::Keeper;
+use super::plan::{Completed, Plan};
+use super::prepare::Job;
+use super::progress::{Phase, Progress};
+use super::samples::{self, Place, Sink};
+use super::sums::{Summed, Sums, Tally, border};
+use super::unit;
+use crate::color::ColorModel;
+use crate::error::Result;
+use crate::filter::Filter;
+use crate::sampler::Stream;
+use crate::sensor::Window;
+
+/// Renders the job's crop, going on from what `keeper` kept, until `progress` asks to stop.
+pub(super) fn render<C: ColorModel>(
+    job: &Job<'_, C>,
+    progress: &dyn Progress,
+    mut keeper: Option<&mut Keeper>,
+) -> Result<(Summed<Sums>, Completed)> {
+    let plan = Plan::new(&job.view.film, job.view.sampler.sample_count());
+    let mut summed = Summed {
+        sums: Sums::new(job.view.film.crop, job.channels())?,
+        next: 0,
+    };
+    if let Some(keeper) = &mut keeper {
+        keeper.resume(&mut summed, plan.units())?;
+    }
+    progress.begin(Phase::Render, plan.samples(plan.units()));
+    progress.advance(plan.samples(summed.next), 0);
+    let summed = unit::run(plan.units(), summed, progress, keeper, |unit| {
+        render_unit(job, &plan, unit, progress)
+    });
+    let completed = plan.completed(summed.next);
+    Ok((summed, completed))
+}
+
+/// One tile, for one pass.
+fn render_unit<C: ColorModel>(
+    job: &Job<'_, C>,
+    plan: &Plan,
+    unit: usize,
+    progress: &dyn Progress,
+) -> Sums {
+    struct Splat<'f>(Sums, &'f Filter);
+    impl Sink for Splat<'_> {
+        fn tally(&mut self) -> &mut Tally {
+            &mut self.0.tally
+        }
+        fn take(&mut self, (pixel, offset): &Place, channels: &[f32]) {
+            self.0.splat(self.1, *pixel, *offset, channels);
+        }
+    }
+    let film = &job.view.film;
+    let (tile, indices) = plan.unit(unit);
+    let reach = tile.grown(border(&film.filter), &film.full());
+    let sums = Sums::new(reach, job.channels()).expect("a tile is small");
+    let mut sink = Splat(sums, &film.filter);
+    let pixels = (tile.y..tile.y + tile.height)
+        .flat_map(|y| (tile.x..tile.x + tile.width).map(move |x| (x, y)))
+        .filter(|(x, y)| {
+            plan.needed.contains(&Window {
+                x: *x,
+                y: *y,
+                width: 1,
+                height: 1,
+            })
+        });
+    let samples = pixels.flat_map(|(x, y)| {
+        let at = move |index| ([x, y], Stream::new(job.seed, x, y, index));
+        indices.clone().map(at)
+    });
+    samples::estimate(job, &job.view.sampler, samples, progress, &mut sink);
+    sink.0
+}
