@@ -33,6 +33,8 @@ def render(a, scene, seed, *arguments):
         out = Path(folder) / 'image.exr'
         command = [a.etendue, 'render', str(scene), '-o', str(out), '--seed', str(seed), '--json', '--quiet',
                    '--sampler', a.sampler, *arguments]
+        if '--noise-threshold' in arguments:
+            command += ['--max-spp', str(a.max_spp)]
         if a.size:
             command += ['--size', a.size]
         report = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
@@ -76,7 +78,7 @@ def bias(a, scene):
         runs = [render(a, scene, first + seed, *arguments) for seed in range(a.seeds)]
         return np.array([(image @ LUMINANCE).mean() for image, _ in runs]), np.mean([spp for _, spp in runs])
     for threshold in a.thresholds:
-        adaptive, spp = means('--noise-threshold', str(threshold), '--max-spp', str(a.max_spp), first=0)
+        adaptive, spp = means('--noise-threshold', str(threshold), first=0)
         uniform, _ = means('--spp', str(a.reference), first=10 ** 6)
         va, vb = adaptive.var(ddof=1) / len(adaptive), uniform.var(ddof=1) / len(uniform)
         difference = (adaptive.mean() - uniform.mean()) / uniform.mean()
@@ -97,7 +99,7 @@ def main():
     p.add_argument('--reference', type=int, default=16384, help='samples a pixel of reference or uniform renders')
     p.add_argument('--uniform', type=int, nargs='+', default=[16, 32, 64, 128, 256, 512])
     p.add_argument('--thresholds', type=float, nargs='+', default=[0.08, 0.04, 0.02])
-    p.add_argument('--max-spp', type=int, default=4096)
+    p.add_argument('--max-spp', type=int, default=1024)
     a = p.parse_args()
     for scene in a.scenes:
         (saves if a.what == 'saves' else bias)(a, scene)

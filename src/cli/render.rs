@@ -71,15 +71,15 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=32), help_heading = IMAGE)]
     bands: Option<u8>,
 
-    /// Sample each part of the image until its noise is below T: the standard error of a pixel's luminance L,
-    /// divided by the square root of L. EXR gets the channels "samples" and "error"
+    /// Give each part of the image as many samples as its noise asks for: none is noisier than T, the standard
+    /// error of a pixel's luminance L divided by the square root of L. EXR gets the channels "samples" and "error"
     #[arg(long, value_name = "T", value_parser = parse::positive, conflicts_with = "spp", help_heading = ADAPTIVE)]
     noise_threshold: Option<f32>,
     /// The fewest samples a pixel; more where the sampler's sets are larger
     #[arg(long, default_value_t = 32, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 24), requires = "noise_threshold", help_heading = ADAPTIVE)]
     min_spp: u32,
     /// The most samples a pixel; more where the sampler's sets are larger
-    #[arg(long, default_value_t = 4096, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 24), requires = "noise_threshold", help_heading = ADAPTIVE)]
+    #[arg(long, default_value_t = 1024, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 24), requires = "noise_threshold", help_heading = ADAPTIVE)]
     max_spp: u32,
 
     /// Render frames START up to, and without, END; each defines $frame
