@@ -1,0 +1,84 @@
+//! Binary digits: the first two of Sobol's sequences, and Owen's scrambling of them by a hash.
+//!
+//! Fractions are held as 32 bits *reversed*, the lowest bit standing for ½. The first sequence (van der
+//! Corput's) is then the index itself. The second has as its bit k the sum modulo 2 of the index's bits j
+//! for which C(j, k) is odd, which by Lucas' theorem are those whose binary digits include k's: five steps,
+//! whatever the index. Owen's scrambling (*Randomly permuted (t,m,s)-nets*, 1995) flips each bit by a random
+//! function of all bits above it, which here are those below it: integer operations carry that way, and a
+//! few of them make a hash of this kind (Laine and Karras, *Stratified sampling for stochastic
+//! transparency*, 2011; Burley, *Practical hash-based Owen scrambling*, 2020; constants by Vegdahl,
+//! *Building a better LK hash*, 2021).
+
+/// The second sequence's element `index`, reversed.
+#[inline]
+pub(super) fn second(mut index: u32) -> u32 {
+    index ^= (index >> 1) & 0x5555_5555;
+    index ^= (index >> 2) & 0x3333_3333;
+    index ^= (index >> 4) & 0x0f0f_0f0f;
+    index ^= (index >> 8) & 0x00ff_00ff;
+    index ^ (index >> 16)
+}
+
+/// Owen's scrambling of a reversed fraction, one for each seed.
+#[inline]
+pub(super) fn scramble(mut reversed: u32, seed: u32) -> u32 {
+    reversed ^= reversed.wrapping_mul(0x3d20_adea);
+    reversed = reversed.wrapping_add(seed);
+    reversed = reversed.wrapping_mul((seed >> 16) | 1);
+    reversed ^= reversed.wrapping_mul(0x0552_6c56);
+    reversed ^ reversed.wrapping_mul(0x53a2_2864)
+}
+
+/// An index's place in a shuffle of 0..`n`, a power of two, that keeps every aligned block of 2^k indices
+/// together, so that the first 2^k points are a net, and so are the next.
+#[inline]
+pub(super) fn shuffle(index: u32, n: u32, seed: u32) -> u32 {
+    scramble(index.reverse_bits(), seed).reverse_bits() & (n - 1)
+}
+
+/// The fraction in [0, 1), cut to 24 bits.
+#[inline]
+pub(super) fn fraction(reversed: u32) -> f32 {
+    (reversed.reverse_bits() >> 8) as f32 * (1.0 / 16_777_216.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// By the recurrence of its direction numbers: v₀ = ½, vⱼ₊₁ = vⱼ ⊕ vⱼ/2.
+    fn second_by_definition(index: u32) -> u32 {
+        let (mut v, mut sum) = (1_u32 << 31, 0);
+        for j in 0..32 {
+            if index >> j & 1 == 1 {
+                sum ^= v;
+            }
+            v ^= v >> 1;
+        }
+        sum
+    }
+
+    #[test]
+    fn the_second_sequence_is_that_of_its_direction_numbers() {
+        for i in (0..1000).chain([u32::MAX, 0xdead_beef, 1 << 31]) {
+            assert_eq!(second(i).reverse_bits(), second_by_definition(i), "{i}");
+        }
+    }
+
+    #[test]
+    fn scrambling_permutes_the_halves_of_every_interval_and_shuffling_blocks_of_indices() {
+        for seed in [0, 1, 0x1234_5678, u32::MAX] {
+            for k in 1..=10 {
+                let n = 1_u32 << k;
+                let mut seen = vec![[false; 2]; n as usize];
+                for i in 0..n {
+                    seen[(scramble(i, seed) & (n - 1)) as usize][0] = true;
+                    seen[shuffle(i, n, seed) as usize][1] = true;
+                }
+                assert!(seen.iter().all(|s| *s == [true; 2]), "{seed} {k}");
+                let half = |i| shuffle(i, n, seed) / n.div_ceil(2);
+                assert!((0..n / 2).all(|i| half(i) == half(0)));
+            }
+        }
+    }
+}
