@@ -1,4 +1,5 @@
-//! Binary digits: the first two of Sobol's sequences, and Owen's scrambling of them by a hash.
+//! Binary digits: the first four of Sobol's sequences (with Joe and Kuo's direction numbers, *Constructing
+//! Sobol sequences with better two-dimensional projections*, 2008), and Owen's scrambling of them by a hash.
 //!
 //! Fractions are held as 32 bits *reversed*, the lowest bit standing for ½. The first sequence (van der
 //! Corput's) is then the index itself. The second has as its bit k the sum modulo 2 of the index's bits j
@@ -17,6 +18,36 @@ pub(super) fn second(mut index: u32) -> u32 {
     index ^= (index >> 4) & 0x0f0f_0f0f;
     index ^= (index >> 8) & 0x00ff_00ff;
     index ^ (index >> 16)
+}
+
+/// The third and fourth sequences' direction numbers, reversed; their polynomials are x² + x + 1 and
+/// x³ + x + 1.
+const DIRECTIONS: [[u32; 32]; 2] = [directions([1, 3, 0], 2, 1), directions([1, 3, 4], 3, 2)];
+
+/// The direction numbers of x^degree + x^(degree − lag) + 1 after the first ones.
+const fn directions(first: [u32; 3], degree: usize, lag: usize) -> [u32; 32] {
+    let mut all = [first[0]; 32];
+    let mut i = 1;
+    while i < 32 {
+        all[i] = match i < degree {
+            true => first[i],
+            false => all[i - degree] ^ (all[i - degree] << degree) ^ all[i - lag],
+        };
+        i += 1;
+    }
+    all
+}
+
+/// Element `index`, below 2^`bits`, of sequence 0 to 3, reversed.
+#[inline]
+pub(super) fn sobol(sequence: u32, index: u32, bits: u32) -> u32 {
+    let directions = match sequence {
+        0 => return index,
+        1 => return second(index),
+        n => &DIRECTIONS[n as usize - 2],
+    };
+    let chosen = (0..bits).zip(directions);
+    chosen.fold(0, |sum, (j, v)| sum ^ (v & (index >> j & 1).wrapping_neg()))
 }
 
 /// Owen's scrambling of a reversed fraction, one for each seed.
@@ -63,6 +94,18 @@ mod tests {
         for i in (0..1000).chain([u32::MAX, 0xdead_beef, 1 << 31]) {
             assert_eq!(second(i).reverse_bits(), second_by_definition(i), "{i}");
         }
+    }
+
+    /// Their first direction numbers in 8ths are 4, 6, 3 and 4, 6, 1.
+    #[test]
+    fn the_third_and_fourth_sequences_are_those_of_joe_and_kuo() {
+        let eighths = |sequence| {
+            [1, 2, 3, 4, 5, 6, 7].map(|i| (fraction(sobol(sequence, i, 3)) * 8.0) as u32)
+        };
+        assert_eq!(eighths(2), [4, 6, 2, 3, 7, 5, 1]);
+        assert_eq!(eighths(3), [4, 6, 2, 1, 5, 7, 3]);
+        // Element 731 as SciPy 1.17 gives it (`qmc.Sobol(4, scramble=False)`, in its order number 877).
+        assert_eq!([0, 1, 2, 3].map(|s| (fraction(sobol(s, 731, 10)) * 1024.0) as u32), [877, 695, 959, 1009]);
     }
 
     #[test]

@@ -125,8 +125,9 @@ fn below_one() -> f32 {
 /// One sample's place in the sequence of its pixel, and how many dimensions it has used.
 ///
 /// A path's dimensions are the same whatever it meets: 0 and 1 for the place in the pixel, 2 and 3 for the
-/// lens, 4 for the time, 5 for the wavelength; then each bounce has its own, which its integrator lays out.
-/// Pairs begin at even dimensions: a draw that would begin one at an odd dimension leaves that out.
+/// lens, 4 for the time, 5 for the wavelength; from 8 on each bounce has its own, which its integrator lays
+/// out. Pairs begin at even dimensions: a draw that would begin one at an odd dimension leaves that out. Four
+/// dimensions from a multiple of four on may be placed jointly, so what is decided together belongs there.
 #[derive(Clone, Copy, Debug)]
 pub struct Stream {
     key: u64,

@@ -1,15 +1,23 @@
-//! `sobol`: Sobol's first two sequences, Owen-scrambled and padded (Burley, *Practical hash-based Owen
-//! scrambling*, JCGT 2020). Each dimension and each pair has a shuffle of the indices and a scrambling of its
-//! own. The first 2^k points of a set, and every following 2^k, put one into each interval of length 2⁻ᵏ
-//! and, in pairs, one into each of the 2^k boxes of every shape 2⁻ⁱ × 2ⁱ⁻ᵏ: a (0, 2)-sequence.
+//! `sobol`: Sobol's first four sequences, Owen-scrambled and padded (Burley, *Practical hash-based Owen
+//! scrambling*, JCGT 2020). Four dimensions make a block, in which the points have one order: pixel and lens,
+//! a light's choice and the point on it, a lobe and the direction in it are sampled jointly. Blocks have
+//! shuffles of their own. The first 2^k points of a set, and every following 2^k, put one into each interval
+//! of length 2⁻ᵏ and, in a block's first two dimensions, into each box of 2⁻ⁱ × 2ⁱ⁻ᵏ: a (0, 2)-sequence.
+//!
+//! Against pairs on their own a block of four has, at 256 points, half the variance at an edge in all four
+//! dimensions and 1/25 where smooth functions of the two pairs interact, and gives away a third at an edge in
+//! the block's last two.
 
 use glam::Vec2;
 
-use super::digits::{fraction, scramble, second, shuffle};
+use super::digits::{fraction, scramble, shuffle, sobol};
 use super::{PointSet, Sampler, place, sample_count};
 use crate::description::Properties;
 use crate::error::Result;
 use crate::math::random;
+
+/// Dimensions that are sampled jointly.
+const BLOCK: u32 = 4;
 
 /// A set is the whole sample count, rounded up to a power of two.
 #[derive(Clone, Debug)]
@@ -26,6 +34,18 @@ impl Sobol {
         Self {
             count: count.next_power_of_two(),
         }
+    }
+
+    /// The key of the block, and which element of the sequences the point is in it.
+    #[inline]
+    fn element(&self, key: u64, index: u32, dimension: u32) -> (u64, u32) {
+        let (key, index) = place(key, index, self.count, dimension / BLOCK);
+        (key, shuffle(index, self.count, key as u32))
+    }
+
+    #[inline]
+    fn coordinate(&self, index: u32, column: u32, seed: u32) -> f32 {
+        fraction(scramble(sobol(column, index, self.count.ilog2()), seed))
     }
 }
 
@@ -48,18 +68,19 @@ impl PointSet for Sobol {
 
     #[inline]
     fn get_1d(&self, key: u64, index: u32, dimension: u32) -> f32 {
-        let (key, index) = place(key, index, self.count, dimension);
-        let index = shuffle(index, self.count, key as u32);
-        fraction(scramble(index, (key >> 32) as u32))
+        let (key, index) = self.element(key, index, dimension);
+        let column = dimension % BLOCK;
+        self.coordinate(index, column, random::bits(key, column) as u32)
     }
 
     #[inline]
     fn get_2d(&self, key: u64, index: u32, dimension: u32) -> Vec2 {
-        let (key, index) = place(key, index, self.count, dimension);
-        let index = shuffle(index, self.count, key as u32);
+        let (key, index) = self.element(key, index, dimension);
+        let column = dimension % BLOCK;
+        let seeds = random::bits(key, column);
         Vec2::new(
-            fraction(scramble(index, (key >> 32) as u32)),
-            fraction(scramble(second(index), random::mix(key) as u32)),
+            self.coordinate(index, column, seeds as u32),
+            self.coordinate(index, column + 1, (seeds >> 32) as u32),
         )
     }
 }

@@ -82,7 +82,7 @@ fn counts_are_rounded_up_as_mitsuba_rounds_them_and_this_is_said() {
     let (_, note) = build("stratified", r#"<integer name="sample_count" value="10"/>"#).unwrap();
     assert_eq!(
         note.unwrap().to_string(),
-        "test.xml:1:54: 10 samples a pixel are rounded up to 16; stratified takes squares"
+        "test.xml:1:51: 10 samples a pixel are rounded up to 16; stratified takes squares"
     );
     assert_eq!(sampler("poisson", 1500).sample_count(), 1500);
     assert_eq!(sampler("poisson", 1500).set_size(), 750);
@@ -390,7 +390,7 @@ fn pairs_of_sobol_and_ldsampler_are_nets() {
     for count in [4, 16, 64, 1024] {
         for name in ["ldsampler", "sobol"] {
             let sampler = sampler(name, count);
-            for (key, dimension) in [(pixel(0), 0), (pixel(1), 2), (pixel(2), 8), (pixel(3), 50)] {
+            for (key, dimension) in [(pixel(0), 0), (pixel(1), 8), (pixel(2), 20), (pixel(3), 48)] {
                 let points: Vec<Vec2> = (0..count)
                     .map(|i| sampler.get_2d(key, i, dimension))
                     .collect();
@@ -403,7 +403,7 @@ fn pairs_of_sobol_and_ldsampler_are_nets() {
 #[test]
 fn sobol_is_a_net_again_and_again_before_its_set_is_full() {
     let sampler = sampler("sobol", 1024);
-    for dimension in [0, 2, 14] {
+    for dimension in [0, 8, 12] {
         let points: Vec<Vec2> = (0..1024)
             .map(|i| sampler.get_2d(pixel(5), i, dimension))
             .collect();
@@ -411,6 +411,19 @@ fn sobol_is_a_net_again_and_again_before_its_set_is_full() {
             assert!(points.chunks(size).all(is_net), "{size}");
         }
     }
+}
+
+/// The two pairs of a block are placed jointly: what depends on both gains too.
+#[test]
+fn sobol_integrates_what_pixel_and_lens_do_together() {
+    let random = sampler("independent", 256);
+    let interaction = |p: Vec2, q: Vec2| f64::from((-4.0 * p.distance_squared(q)).exp());
+    let gain = variance(&random, interaction) / variance(&sampler("sobol", 256), interaction);
+    assert!(gain > 8.0, "{gain}");
+    let edge =
+        |p: Vec2, q: Vec2| f64::from(u8::from(0.4 * p.x + 0.3 * p.y + q.x + 0.3 * q.y < 0.95));
+    let gain = variance(&random, edge) / variance(&sampler("sobol", 256), edge);
+    assert!(gain > 5.0, "{gain}");
 }
 
 /// In sample space, whatever the pixel, the pair and the set.
@@ -475,6 +488,8 @@ fn points_in_strata_integrate_better_than_independent_ones() {
         let expected = variance(&random, f);
         for name in ["ldsampler", "multijitter", "poisson", "sobol", "stratified"] {
             let gain = expected / variance(&sampler(name, 64), f);
+            // On the torus a function's two sides meet, and that is an edge.
+            let factor = if name == "poisson" { 2.5 } else { factor };
             assert!(gain > factor, "{name}, {what}: {gain}");
         }
         let gain =
