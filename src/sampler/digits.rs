@@ -105,7 +105,10 @@ mod tests {
         assert_eq!(eighths(2), [4, 6, 2, 3, 7, 5, 1]);
         assert_eq!(eighths(3), [4, 6, 2, 1, 5, 7, 3]);
         // Element 731 as SciPy 1.17 gives it (`qmc.Sobol(4, scramble=False)`, in its order number 877).
-        assert_eq!([0, 1, 2, 3].map(|s| (fraction(sobol(s, 731, 10)) * 1024.0) as u32), [877, 695, 959, 1009]);
+        assert_eq!(
+            [0, 1, 2, 3].map(|s| (fraction(sobol(s, 731, 10)) * 1024.0) as u32),
+            [877, 695, 959, 1009]
+        );
     }
 
     #[test]

@@ -124,5 +124,8 @@ impl PointSet for Orthogonal {
 
 /// By trial division: the numbers are below 2^16.
 fn is_prime(n: u32) -> bool {
-    n >= 2 && (2..).take_while(|d| d * d <= n).all(|d| n % d != 0)
+    n >= 2
+        && (2..)
+            .take_while(|d| d * d <= n)
+            .all(|d| !n.is_multiple_of(d))
 }
