@@ -21,10 +21,12 @@ import numpy as np
 
 ROOT = Path(__file__).resolve().parent.parent
 SCENES = ['zone-plate', 'soft-shadow', 'lens']
-# In the order of the legend; the first is the yardstick.
-SAMPLERS = ['independent', 'grid', 'stratified', 'multijitter', 'orthogonal', 'poisson', 'ldsampler', 'sobol']
+YARDSTICK = 'independent'
+# In the order of the legend.
+SAMPLERS = [YARDSTICK, 'grid', 'stratified', 'multijitter', 'orthogonal', 'poisson', 'ldsampler', 'sobol']
 MUST_WIN = ['stratified', 'poisson', 'sobol']
-COLORS = ['#222222', '#999999', '#1f77b4', '#17becf', '#9467bd', '#2ca02c', '#ff7f0e', '#d62728']
+COLORS = dict(zip(SAMPLERS, ['#222222', '#999999', '#1f77b4', '#17becf', '#9467bd', '#2ca02c', '#ff7f0e',
+                             '#d62728']))
 
 
 def read_exr(path):
@@ -48,7 +50,7 @@ def measure(a, scene, folder):
     """For each sampler the counts and their mean squared errors over pixels, channels and seeds."""
     reference = np.mean([render(a, scene, 'sobol', a.reference, 1000 + seed, folder)[0] for seed in range(2)], 0)
     errors = {}
-    for sampler in SAMPLERS:
+    for sampler in a.samplers:
         rows = []
         for wanted in a.spp:
             images = [render(a, scene, sampler, wanted, seed, folder) for seed in range(1, a.seeds + 1)]
@@ -66,7 +68,7 @@ def slope(rows):
 
 def gains(errors):
     """The yardstick's error over each sampler's, at the sampler's own counts."""
-    falling, height = slope(errors[SAMPLERS[0]])
+    falling, height = slope(errors[YARDSTICK])
     expected = lambda n: math.exp(height + falling * math.log(n))
     return {sampler: [expected(n) / error for n, error in rows] for sampler, rows in errors.items()}
 
@@ -101,13 +103,14 @@ def svg(results):
             y = at(10 ** x0, 10.0 ** power)[1]
             parts.append(f'<line x1="{left}" x2="{left + width}" y1="{y:.1f}" y2="{y:.1f}" stroke="#ddd"/>'
                          f'<text x="{left - 4}" y="{y + 4:.1f}" text-anchor="end">1e{power}</text>')
-        for n in sorted({n for n, _ in errors[SAMPLERS[0]]}):
+        for n in sorted({n for n, _ in errors[YARDSTICK]}):
             x = at(n, 10 ** y0)[0]
             parts.append(f'<line x1="{x:.1f}" x2="{x:.1f}" y1="{margin}" y2="{margin + height}" stroke="#ddd"/>'
                          f'<text x="{x:.1f}" y="{margin + height + 16}" text-anchor="middle">{n}</text>')
-        for i, (sampler, color) in enumerate(zip(SAMPLERS, COLORS)):
+        for i, sampler in enumerate(errors):
+            color = COLORS[sampler]
             line = ' '.join('{:.1f},{:.1f}'.format(*at(*p)) for p in errors[sampler])
-            y = margin + height - 14 * (len(SAMPLERS) - i) + 4
+            y = margin + height - 14 * (len(errors) - i) + 4
             parts.append(f'<polyline points="{line}" fill="none" stroke="{color}" stroke-width="1.8"/>'
                          f'<text x="{left + 8}" y="{y}" fill="{color}">{sampler}'
                          f' {slope(errors[sampler])[0]:.2f}</text>')
@@ -122,6 +125,8 @@ def main():
     p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     p.add_argument('scenes', nargs='*', type=Path, help='scene files (those in scenes/: zone-plate, soft-shadow, lens)')
     p.add_argument('--etendue', required=True, help='the binary')
+    p.add_argument('--samplers', nargs='+', default=SAMPLERS, choices=SAMPLERS, metavar='NAME',
+                   help=f'all of them by default; {YARDSTICK} is always measured')
     p.add_argument('--spp', type=int, nargs='+', default=[4, 16, 64, 256], help='samples a pixel (4 16 64 256)')
     p.add_argument('--seeds', type=int, default=4, help='renders of each kind (4)')
     p.add_argument('--reference', type=int, default=8192, help='samples a pixel of the two reference images (8192)')
@@ -129,6 +134,7 @@ def main():
     p.add_argument('--svg', type=Path, help='write the plot here')
     p.add_argument('--json', type=Path, help='write the figures here')
     a = p.parse_args()
+    a.samplers = [name for name in SAMPLERS if name == YARDSTICK or name in a.samplers]
     scenes = a.scenes or [ROOT / 'scenes' / f'{name}.xml' for name in SCENES]
     results, won = {}, True
     with tempfile.TemporaryDirectory(prefix='convergence-') as folder:

@@ -1,4 +1,4 @@
-//! Binary digits: the first four of Sobol's sequences (with Joe and Kuo's direction numbers, *Constructing
+//! Binary digits: the first sixteen of Sobol's sequences (with Joe and Kuo's direction numbers, *Constructing
 //! Sobol sequences with better two-dimensional projections*, 2008), and Owen's scrambling of them by a hash.
 //!
 //! Fractions are held as 32 bits *reversed*, the lowest bit standing for ½. The first sequence (van der
@@ -20,33 +20,69 @@ pub(super) fn second(mut index: u32) -> u32 {
     index ^ (index >> 16)
 }
 
-/// The third and fourth sequences' direction numbers, reversed; their polynomials are x² + x + 1 and
-/// x³ + x + 1.
-const DIRECTIONS: [[u32; 32]; 2] = [directions([1, 3, 0], 2, 1), directions([1, 3, 4], 3, 2)];
+/// How many of Sobol's sequences there are here.
+pub(super) const SEQUENCES: usize = 16;
 
-/// The direction numbers of x^degree + x^(degree − lag) + 1 after the first ones.
-const fn directions(first: [u32; 3], degree: usize, lag: usize) -> [u32; 32] {
-    let mut all = [first[0]; 32];
-    let mut i = 1;
+/// Their primitive polynomials (degree, and the coefficients between the first and the last as bits) and first
+/// direction numbers, of which each ends at its degree. The first sequence has neither.
+const POLYNOMIALS: [(usize, u32, [u32; 6]); SEQUENCES] = [
+    (0, 0, [0; 6]),
+    (1, 0, [1, 0, 0, 0, 0, 0]),
+    (2, 1, [1, 3, 0, 0, 0, 0]),
+    (3, 1, [1, 3, 1, 0, 0, 0]),
+    (3, 2, [1, 1, 1, 0, 0, 0]),
+    (4, 1, [1, 1, 3, 3, 0, 0]),
+    (4, 4, [1, 3, 5, 13, 0, 0]),
+    (5, 2, [1, 1, 5, 5, 17, 0]),
+    (5, 4, [1, 1, 5, 5, 5, 0]),
+    (5, 7, [1, 1, 7, 11, 19, 0]),
+    (5, 11, [1, 1, 5, 1, 1, 0]),
+    (5, 13, [1, 1, 1, 3, 11, 0]),
+    (5, 14, [1, 3, 5, 5, 31, 0]),
+    (6, 1, [1, 3, 3, 9, 7, 49]),
+    (6, 13, [1, 1, 1, 15, 21, 21]),
+    (6, 16, [1, 3, 1, 13, 27, 49]),
+];
+
+/// All direction numbers, reversed.
+const DIRECTIONS: [[u32; 32]; SEQUENCES] = {
+    let mut all = [[0; 32]; SEQUENCES];
+    let mut sequence = 0;
+    while sequence < SEQUENCES {
+        all[sequence] = directions(POLYNOMIALS[sequence]);
+        sequence += 1;
+    }
+    all
+};
+
+const fn directions((degree, between, first): (usize, u32, [u32; 6])) -> [u32; 32] {
+    let mut v = [0; 32];
+    let mut i = 0;
     while i < 32 {
-        all[i] = match i < degree {
-            true => first[i],
-            false => all[i - degree] ^ (all[i - degree] << degree) ^ all[i - lag],
+        v[i] = if degree == 0 {
+            1 << i
+        } else if i < degree {
+            first[i].reverse_bits() >> (31 - i)
+        } else {
+            let mut sum = v[i - degree] ^ (v[i - degree] << degree);
+            let mut lag = 1;
+            while lag < degree {
+                if between >> (degree - 1 - lag) & 1 == 1 {
+                    sum ^= v[i - lag];
+                }
+                lag += 1;
+            }
+            sum
         };
         i += 1;
     }
-    all
+    v
 }
 
-/// Element `index`, below 2^`bits`, of sequence 0 to 3, reversed.
+/// Element `index`, below 2^`bits`, of a sequence, reversed.
 #[inline]
-pub(super) fn sobol(sequence: u32, index: u32, bits: u32) -> u32 {
-    let directions = match sequence {
-        0 => return index,
-        1 => return second(index),
-        n => &DIRECTIONS[n as usize - 2],
-    };
-    let chosen = (0..bits).zip(directions);
+pub(super) fn sobol(sequence: usize, index: u32, bits: u32) -> u32 {
+    let chosen = (0..bits).zip(&DIRECTIONS[sequence]);
     chosen.fold(0, |sum, (j, v)| sum ^ (v & (index >> j & 1).wrapping_neg()))
 }
 
@@ -96,19 +132,24 @@ mod tests {
         }
     }
 
-    /// Their first direction numbers in 8ths are 4, 6, 3 and 4, 6, 1.
     #[test]
-    fn the_third_and_fourth_sequences_are_those_of_joe_and_kuo() {
+    fn sequences_are_those_of_joe_and_kuo() {
         let eighths = |sequence| {
             [1, 2, 3, 4, 5, 6, 7].map(|i| (fraction(sobol(sequence, i, 3)) * 8.0) as u32)
         };
         assert_eq!(eighths(2), [4, 6, 2, 3, 7, 5, 1]);
         assert_eq!(eighths(3), [4, 6, 2, 1, 5, 7, 3]);
-        // Element 731 as SciPy 1.17 gives it (`qmc.Sobol(4, scramble=False)`, in its order number 877).
-        assert_eq!(
-            [0, 1, 2, 3].map(|s| (fraction(sobol(s, 731, 10)) * 1024.0) as u32),
-            [877, 695, 959, 1009]
-        );
+        // Element 731 as SciPy 1.17 gives it (`qmc.Sobol(16, scramble=False)`, in its order number 877).
+        let expected = [
+            877, 695, 959, 1009, 259, 917, 219, 741, 1005, 899, 803, 113, 97, 653, 783, 1015,
+        ];
+        for (sequence, expected) in expected.into_iter().enumerate() {
+            let element = fraction(sobol(sequence, 731, 10)) * 1024.0;
+            assert_eq!(element, expected as f32, "{sequence}");
+        }
+        for i in 0..1000 {
+            assert_eq!((sobol(0, i, 10), sobol(1, i, 10)), (i, second(i)));
+        }
     }
 
     #[test]
