@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 ROOT = Path(__file__).resolve().parent.parent
-SCENES = ['zone-plate', 'soft-shadow', 'lens']
+SCENES = [ROOT / 'scenes/zone-plate.xml', ROOT / 'scenes/soft-shadow.xml', ROOT / 'tools/convergence-lens.xml']
 YARDSTICK = 'independent'
 # In the order of the legend.
 SAMPLERS = [YARDSTICK, 'grid', 'stratified', 'multijitter', 'orthogonal', 'poisson', 'ldsampler', 'sobol']
@@ -123,7 +123,7 @@ def svg(results):
 
 def main():
     p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    p.add_argument('scenes', nargs='*', type=Path, help='scene files (those in scenes/: zone-plate, soft-shadow, lens)')
+    p.add_argument('scenes', nargs='*', type=Path, help='scene files (a zone plate, soft shadows, a lens)')
     p.add_argument('--etendue', required=True, help='the binary')
     p.add_argument('--samplers', nargs='+', default=SAMPLERS, choices=SAMPLERS, metavar='NAME',
                    help=f'all of them by default; {YARDSTICK} is always measured')
@@ -135,10 +135,9 @@ def main():
     p.add_argument('--json', type=Path, help='write the figures here')
     a = p.parse_args()
     a.samplers = [name for name in SAMPLERS if name == YARDSTICK or name in a.samplers]
-    scenes = a.scenes or [ROOT / 'scenes' / f'{name}.xml' for name in SCENES]
     results, won = {}, True
     with tempfile.TemporaryDirectory(prefix='convergence-') as folder:
-        for scene in scenes:
+        for scene in a.scenes or SCENES:
             try:
                 errors = measure(a, scene, Path(folder))
             except (OSError, RuntimeError) as error:
