@@ -180,3 +180,126 @@ impl Seen {
         (DVec2::new(x, y) - self.low) / (self.high - self.low)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::DMat4;
+
+    use super::*;
+    use crate::math::random;
+    use crate::mesh;
+
+    fn quad(matrix: DMat4, flip: bool) -> Option<Quad> {
+        let mut mesh = mesh::rectangle();
+        mesh.transform(&matrix);
+        if flip {
+            mesh.flip_normals();
+        }
+        Quad::of(&mesh)
+    }
+
+    fn placed() -> DMat4 {
+        DMat4::from_translation(DVec3::new(3.0, -1.0, 2.0))
+            * DMat4::from_rotation_x(0.7)
+            * DMat4::from_scale(DVec3::new(2.0, 0.5, 1.0))
+    }
+
+    #[test]
+    fn a_mesh_is_a_rectangle_only_if_its_angles_are_right() {
+        assert!(quad(placed(), false).is_some() && quad(placed(), true).is_some());
+        let sheared = DMat4::from_cols_array_2d(&[
+            [1.0, 0.1, 0.0, 0.0],
+            [0.0, 1.0, 0.0, 0.0],
+            [0.0, 0.0, 1.0, 0.0],
+            [0.0, 0.0, 0.0, 1.0],
+        ]);
+        assert!(quad(sheared, false).is_none());
+        assert!(Quad::of(&mesh::cube()).is_none());
+    }
+
+    #[test]
+    fn places_lie_where_their_fractions_say_and_give_them_back() {
+        for flip in [false, true] {
+            let mut mesh = mesh::rectangle();
+            mesh.transform(&placed());
+            if flip {
+                mesh.flip_normals();
+            }
+            let quad = Quad::of(&mesh).unwrap();
+            for (x, y) in [(0.1, 0.7), (0.9, 0.2), (0.5, 0.5), (0.0, 1.0)] {
+                let place = quad.place(DVec2::new(x, y));
+                let corners = mesh.corners(&mesh.triangles[place.triangle as usize]);
+                let b = place.barycentric;
+                let position = b[0] * corners[0] + b[1] * corners[1] + b[2] * corners[2];
+                let [along, up] = quad.axes;
+                let expected = quad.corner + along * quad.size.x * x + up * quad.size.y * y;
+                assert!(position.as_dvec3().distance(expected) < 1e-5);
+                let back = quad.fractions(place.triangle, Vec2::new(b[1], b[2]));
+                assert!((back.as_dvec2() - DVec2::new(x, y)).length() < 1e-6);
+            }
+        }
+    }
+
+    /// Of a rectangle [x0, x1] × [y0, y1] at distance d, by its corners.
+    fn solid_angle(low: DVec2, high: DVec2, d: f64) -> f64 {
+        let corner = |x: f64, y: f64| (x * y / (d * (x * x + y * y + d * d).sqrt())).atan();
+        corner(high.x, high.y) - corner(low.x, high.y) - corner(high.x, low.y)
+            + corner(low.x, low.y)
+    }
+
+    #[test]
+    fn points_are_uniform_over_the_solid_angle_from_near_far_and_aside() {
+        let quad = quad(placed(), false).unwrap();
+        let [x, y] = quad.axes;
+        let n = x.cross(y);
+        for (along, up, away) in [
+            (0.5, 0.5, 1.0),
+            (0.5, 0.5, -0.3),
+            (-3.0, 2.0, 0.7),
+            (40.0, 10.0, 5.0),
+            (0.1, 5.0, 300.0),
+            (2.0, 0.5, 0.02),
+            (800.0, 700.0, 900.0),
+        ] {
+            let from = quad.corner + x * quad.size.x * along + y * quad.size.y * up + n * away;
+            let from = from.as_vec3();
+            let seen = quad.seen(from).unwrap();
+            let exact = solid_angle(seen.low, seen.high, seen.distance);
+            let ratio = seen.solid_angle / exact;
+            assert!((ratio - 1.0).abs() < 1e-5, "{along} {up} {away}: {ratio}");
+            // The part of the angle that lies in a part of the rectangle is that of the points there.
+            let side = 200;
+            let part = |at: DVec2| at.x < 0.3 && at.y > 0.4;
+            let mut inside = 0;
+            for i in 0..side * side {
+                let jitter = |n| random::unit(random::bits(n, i));
+                let u = Vec2::new(
+                    ((i % side) as f32 + jitter(1)) / side as f32,
+                    ((i / side) as f32 + jitter(2)) / side as f32,
+                );
+                let at = seen.sample(u);
+                assert!(at.cmpge(DVec2::ZERO).all() && at.cmple(DVec2::ONE).all());
+                inside += u32::from(part(at));
+            }
+            let size = seen.high - seen.low;
+            let low = seen.low + size * DVec2::new(0.0, 0.4);
+            let high = seen.low + size * DVec2::new(0.3, 1.0);
+            let expected = solid_angle(low, high, seen.distance) / exact;
+            let found = f64::from(inside) / f64::from(side * side);
+            assert!(
+                (found - expected).abs() < 4e-3,
+                "{along} {up} {away}: {found} {expected}"
+            );
+        }
+    }
+
+    #[test]
+    fn what_is_too_small_or_edge_on_is_left_to_the_area() {
+        let quad = quad(placed(), false).unwrap();
+        let [x, y] = quad.axes;
+        let middle = quad.corner + 0.5 * (x * quad.size.x + y * quad.size.y);
+        assert!(quad.seen((middle + x * 9.0).as_vec3()).is_none());
+        assert!(quad.seen(middle.as_vec3()).is_none());
+        assert!(quad.seen((middle + x.cross(y) * 1e6).as_vec3()).is_none());
+    }
+}
