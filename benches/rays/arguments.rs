@@ -22,6 +22,10 @@ pub(crate) struct Arguments {
     #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) repeat: u32,
 
+    /// Build each tree only once, with all threads, and none that is not traced
+    #[arg(long)]
+    pub(crate) once: bool,
+
     /// Also write what was measured, as JSON
     #[arg(long, value_name = "FILE")]
     pub(crate) json: Option<PathBuf>,
@@ -43,6 +47,6 @@ impl Arguments {
 
     /// How many rays a set has.
     pub(crate) fn rays(&self) -> usize {
-        if self.quick { 1 << 17 } else { 1 << 19 }
+        if self.quick { 1 << 16 } else { 1 << 18 }
     }
 }

@@ -14,7 +14,7 @@ use crate::meshes::{Named, triangles};
 use crate::ours;
 use crate::peer::{Maker, Peer};
 use crate::rays::{Batch, Question, Set, sets};
-use crate::report::{BuildRow, Differences, MeshReport, Ratio, Row, SetReport, Speed};
+use crate::report::{BuildRow, BuildTime, Differences, MeshReport, Ratio, Row, SetReport, Speed};
 
 /// Builds, traces and compares.
 pub(crate) fn mesh(
@@ -24,8 +24,8 @@ pub(crate) fn mesh(
     arguments: &Arguments,
 ) -> Result<MeshReport, String> {
     let (mut builds, mut peers) = (Vec::new(), Vec::new());
-    for maker in makers {
-        let (row, made) = build(maker, geometry)?;
+    for maker in makers.iter().filter(|m| m.traced || !arguments.once) {
+        let (row, made) = build(maker, geometry, arguments.once)?;
         builds.push(row);
         peers.extend(made);
     }
@@ -55,10 +55,11 @@ pub(crate) fn thread_counts() -> &'static [usize] {
     }
 }
 
-/// Builds with each number of threads: short ones several times.
+/// Builds with each number of threads, short ones several times; or `once`.
 fn build(
     maker: &Maker,
     geometry: &Arc<Geometry>,
+    once: bool,
 ) -> Result<(BuildRow, Vec<Box<dyn Peer>>), String> {
     /// Seconds after which it is not built once more.
     const ENOUGH: f64 = 0.5;
@@ -68,15 +69,22 @@ fn build(
         bytes: 0,
     };
     let mut peers = Vec::new();
-    for &threads in thread_counts() {
+    let all = thread_counts();
+    let (counts, most) = if once {
+        (&all[all.len() - 1..], 1)
+    } else {
+        (all, 5)
+    };
+    for &threads in counts {
         let mut times = Vec::new();
-        while times.len() < 5 && times.iter().sum::<f64>() < ENOUGH {
+        while times.len() < most && times.iter().sum::<f64>() < ENOUGH {
             peers.clear(); // before the next one takes its memory
             let built = (maker.build)(geometry, threads)?;
             times.push(built.seconds);
             (peers, row.bytes) = (built.peers, built.bytes);
         }
-        row.seconds.push(median(&times));
+        let median = median(&times);
+        row.seconds.push(BuildTime { threads, median });
     }
     Ok((row, peers))
 }

@@ -31,6 +31,7 @@ macro_rules! theirs {
             fn maker() -> Maker {
                 Maker {
                     name: $name,
+                    traced: true,
                     build: Box::new(|geometry, threads| {
                         let corners = corners(geometry);
                         let start = Instant::now();

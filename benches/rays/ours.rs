@@ -15,6 +15,7 @@ pub(crate) const NAME: &str = "Étendue";
 pub(crate) fn makers() -> Vec<Maker> {
     vec![Maker {
         name: NAME,
+        traced: true,
         build: Box::new(|geometry, threads| {
             let start = Instant::now();
             let tracer = on_threads(threads, || tracer(geometry));

@@ -26,7 +26,7 @@ pub(crate) trait Peer: Send + Sync {
 
 /// What a build came to.
 pub(crate) struct Built {
-    /// Ways to trace with it; none where only its build is of interest.
+    /// Ways to trace with it.
     pub(crate) peers: Vec<Box<dyn Peer>>,
     /// Of the build alone.
     pub(crate) seconds: f64,
@@ -40,6 +40,8 @@ pub(crate) type Build = dyn Fn(&Arc<Geometry>, usize) -> Result<Built, String>;
 /// A builder by its name.
 pub(crate) struct Maker {
     pub(crate) name: &'static str,
+    /// Whether it gives ways to trace: else only its build is of interest.
+    pub(crate) traced: bool,
     pub(crate) build: Box<Build>,
 }
 
