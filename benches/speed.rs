@@ -10,11 +10,12 @@ use std::sync::{Arc, OnceLock};
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use etendue::accel::{Counts, Method, Tracer};
-use etendue::description::{self, Description};
+use etendue::description::{self, Description, Kind};
 use etendue::interaction::{Hit, Ray};
 use etendue::math::{random, warp};
 use etendue::mesh;
 use etendue::render::{Colors, Options, Overrides, Silent, render};
+use etendue::sampler::{Sampler, Stream};
 use etendue::shape::{Geometry, TriangleMesh};
 use glam::{Vec2, Vec3};
 
@@ -123,6 +124,35 @@ fn occluded_shadow(bencher: Bencher<'_, '_>) {
 fn build_tree(bencher: Bencher<'_, '_>) {
     let geometry = geometry();
     bencher.bench_local(|| Tracer::new(geometry.clone(), &[0], Vec::new(), Method::Tree));
+}
+
+/// 64 samples of four pairs each in a row of pixels, as a path draws them.
+#[divan::bench(args = Sampler::NAMES, sample_count = 20)]
+fn draw_pairs(bencher: Bencher<'_, '_>, name: &str) {
+    let sampler = format!(
+        r#"<scene version="3.0.0"><sampler type="{name}"><integer name="sample_count" value="64"/></sampler></scene>"#
+    );
+    let scene = Description::parse(
+        &sampler,
+        "bench.xml".as_ref(),
+        &description::Options::default(),
+    );
+    let scene = scene.expect("the scene is right");
+    let properties = scene.root().children(Kind::Sampler)[0];
+    let sampler = Sampler::build(&properties, &()).expect("the sampler is right");
+    let (pixels, samples, pairs) = (16, 64, 4);
+    bencher
+        .counter(ItemsCount::new(pixels * samples * pairs))
+        .bench_local(|| {
+            let mut sum = Vec2::ZERO;
+            for (pixel, sample) in (0..pixels).flat_map(|x| (0..samples).map(move |i| (x, i))) {
+                let mut stream = Stream::new(0, pixel, 0, sample);
+                for _ in 0..pairs {
+                    sum += stream.next_2d(black_box(&sampler));
+                }
+            }
+            sum
+        });
 }
 
 /// A scene of `scenes/`, small.

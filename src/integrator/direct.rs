@@ -125,7 +125,7 @@ impl<C: ColorModel> Estimator<C> for Direct {
             let mut stream = start.stream;
             stream.seek(FIRST_DIMENSION);
             for _ in 0..self.emitter_samples {
-                let (u1, u2) = (stream.next_1d(sampler), stream.next_2d(sampler));
+                let (u2, u1) = (stream.next_2d(sampler), stream.next_1d(sampler));
                 let Some(light) = scene.sample_light(at.position, u1, u2, w) else {
                     continue;
                 };
@@ -154,7 +154,7 @@ impl<C: ColorModel> Estimator<C> for Direct {
                 }
             }
             for _ in 0..self.bsdf_samples {
-                let (u1, u2) = (stream.next_1d(sampler), stream.next_2d(sampler));
+                let (u2, u1) = (stream.next_2d(sampler), stream.next_1d(sampler));
                 let Some(sample) = material.sample(&at, at.wi, u1, u2, w) else {
                     continue;
                 };

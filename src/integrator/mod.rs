@@ -115,8 +115,8 @@ impl<C: ColorModel> Default for Integrator<C> {
     }
 }
 
-/// The first dimension that an integrator may use; those before are the camera's.
-pub const FIRST_DIMENSION: u32 = 6;
+/// The first dimension that an integrator may use; those before are the camera's, and two to spare.
+pub const FIRST_DIMENSION: u32 = 8;
 
 impl<C: ColorModel> Estimator<C> for Integrator<C> {
     fn extra_channels(&self) -> Vec<String> {

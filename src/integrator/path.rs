@@ -33,7 +33,8 @@ impl Default for Path {
     }
 }
 
-/// Dimensions of a bounce: light choice, light, lobe, direction, roulette; one to spare.
+/// Dimensions of a bounce, in fours: the point on a light, which light, and one to spare; the direction, the
+/// lobe, roulette.
 const DIMENSIONS: u32 = 8;
 /// The longest life that roulette grants.
 const MAX_SURVIVAL: f32 = 0.95;
@@ -117,10 +118,8 @@ impl Path {
         walker: &mut Walker<C>,
         at: &Interaction<'_>,
     ) -> Option<Shadow<C::Sample>> {
-        let (u1, u2) = (
-            walker.stream.next_1d(sampler),
-            walker.stream.next_2d(sampler),
-        );
+        let u2 = walker.stream.next_2d(sampler);
+        let u1 = walker.stream.next_1d(sampler);
         let material = scene.material(at);
         if !material.is_smooth() {
             return None;
@@ -158,10 +157,8 @@ impl Path {
         mut walker: Walker<C>,
         at: &Interaction<'_>,
     ) -> Option<Walker<C>> {
-        let (u1, u2) = (
-            walker.stream.next_1d(sampler),
-            walker.stream.next_2d(sampler),
-        );
+        let u2 = walker.stream.next_2d(sampler);
+        let u1 = walker.stream.next_1d(sampler);
         let sample = scene
             .material(at)
             .sample(at, at.wi, u1, u2, &walker.wavelengths)?;

@@ -1,15 +1,18 @@
-//! `area`: a shape that emits `radiance` from its front, the same in all directions.
+//! `area`: a shape that emits `radiance` from its front, the same in all directions. Points are drawn as the
+//! shape draws them, by solid angle where it can, and where a texture makes parts of it bright also by that.
 
+use std::f64::consts::PI;
 use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
 
-use super::{Emitter, LightContext, LightSample, texture_point};
+use super::brightness::Brightness;
+use super::{Emitter, LightContext, LightSample, interaction, mean_of};
 use crate::color::{Color, ColorModel, Role, Spectral};
 use crate::description::Properties;
 use crate::error::Result;
 use crate::interaction::Interaction;
-use crate::shape::{Geometry, SurfaceSample};
+use crate::shape::Geometry;
 use crate::texture::{Palettes, Texture};
 
 /// A shape that gives light.
@@ -17,6 +20,10 @@ use crate::texture::{Palettes, Texture};
 pub struct Area<C: ColorModel> {
     radiance: Texture<C>,
     shape: Arc<Geometry>,
+    /// Over the area, of the channels' mean.
+    mean: f64,
+    /// Where a texture is not even.
+    brightness: Option<Brightness>,
 }
 
 impl<C: ColorModel> Area<C> {
@@ -34,9 +41,15 @@ impl<C: ColorModel> Area<C> {
         };
         let Palettes { colors, .. } = context.palettes;
         let radiance = colors.texture(properties, "radiance", Role::Emission, Color::D65(1.0))?;
+        let (mean, brightness) = match &radiance {
+            Texture::Uniform(value) => (mean_of(&colors.color, value.value()), None),
+            _ => Brightness::survey(&radiance, shape, &colors.color),
+        };
         Ok(Self {
             radiance,
             shape: shape.clone(),
+            mean,
+            brightness,
         })
     }
 }
@@ -48,30 +61,20 @@ impl<C: ColorModel> Emitter<C> for Area<C> {
         u: Vec2,
         wavelengths: &C::Wavelengths,
     ) -> Option<LightSample<C::Sample>> {
-        let SurfaceSample {
-            position,
-            normal,
-            uv,
-            primitive,
-            barycentric,
-            pdf,
-        } = self.shape.sample(from, u)?;
-        let direction = (position - from).normalize();
-        if direction.dot(normal) >= 0.0 {
+        let point = match &self.brightness {
+            Some(brightness) => brightness.sample(&self.shape, from, u)?,
+            None => self.shape.sample(from, u)?,
+        };
+        let direction = (point.position - from).normalize_or_zero();
+        if direction.dot(point.normal) >= 0.0 {
             return None;
         }
-        let point = Interaction {
-            primitive,
-            barycentric,
-            mesh: self.shape.mesh(),
-            ..texture_point(position, normal, uv)
-        };
-        let radiance = self.radiance.eval(&point, wavelengths);
+        let at = interaction(&self.shape, &point);
         Some(LightSample {
             direction,
-            target: Some(position),
-            radiance,
-            pdf,
+            target: Some(point.position),
+            radiance: self.radiance.eval(&at, wavelengths),
+            pdf: point.pdf,
             delta: false,
         })
     }
@@ -85,6 +88,13 @@ impl<C: ColorModel> Emitter<C> for Area<C> {
     }
 
     fn surface_pdf(&self, from: Vec3, at: &Interaction<'_>) -> f32 {
-        self.shape.pdf(from, at)
+        match &self.brightness {
+            Some(brightness) => brightness.pdf(&self.shape, from, at),
+            None => self.shape.pdf(from, at),
+        }
+    }
+
+    fn power(&self, _color: &C, _radius: f64) -> f64 {
+        PI * self.shape.area() * self.mean
     }
 }

@@ -4,7 +4,7 @@ use std::f32::consts::FRAC_1_PI;
 
 use glam::{Vec2, Vec3};
 
-use super::{Emitter, LightContext, LightSample};
+use super::{Emitter, LightContext, LightSample, mean_of};
 use crate::color::{Color, ColorModel, Role};
 use crate::description::Properties;
 use crate::error::Result;
@@ -61,5 +61,9 @@ impl<C: ColorModel> Emitter<C> for Constant<C> {
 
     fn environment_pdf(&self, _direction: Vec3) -> f32 {
         PDF
+    }
+
+    fn power(&self, color: &C, radius: f64) -> f64 {
+        4.0 * std::f64::consts::PI.powi(2) * radius * radius * mean_of(color, &self.radiance)
     }
 }

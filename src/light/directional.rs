@@ -1,9 +1,11 @@
 //! `directional`: parallel light along `direction` (or the z axis of `to_world`, +z by default) that
 //! brings `irradiance` to a surface at right angles.
 
+use std::f64::consts::PI;
+
 use glam::{DVec3, Vec2, Vec3};
 
-use super::{Emitter, LightContext, LightSample, to_world};
+use super::{Emitter, LightContext, LightSample, mean_of, to_world};
 use crate::color::{Color, ColorModel, Role};
 use crate::description::Properties;
 use crate::error::Result;
@@ -64,5 +66,9 @@ impl<C: ColorModel> Emitter<C> for Directional<C> {
             pdf: 1.0,
             delta: true,
         })
+    }
+
+    fn power(&self, color: &C, radius: f64) -> f64 {
+        PI * radius * radius * mean_of(color, &self.irradiance)
     }
 }

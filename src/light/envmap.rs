@@ -26,6 +26,8 @@ pub struct Envmap<C: ColorModel> {
     to_world: Mat3,
     /// Over [`Point`]s; `None` where all is black.
     cells: Option<Grid>,
+    /// The mean luminance over all directions.
+    mean: f64,
 }
 
 /// A place on the grid of cells, in [0, 1]²: 0 is the first texel's centre across, the first row's down.
@@ -58,6 +60,7 @@ impl<C: ColorModel> Envmap<C> {
             return Err(properties.error("filename", message));
         }
         let color = &context.palettes.colors.color;
+        let weights = weights(&picture);
         Ok(Self {
             width,
             height,
@@ -67,7 +70,9 @@ impl<C: ColorModel> Envmap<C> {
                 .collect(),
             scale: scale as f32,
             to_world,
-            cells: Grid::new(width, &weights(&picture)).filter(|_| scale > 0.0),
+            cells: Grid::new(width, &weights).filter(|_| scale > 0.0),
+            // A cell's weight is four times its luminance, and `width` of them fill a band of the sphere.
+            mean: scale * weights.iter().sum::<f64>() / (8 * width) as f64,
         })
     }
 
@@ -154,5 +159,9 @@ impl<C: ColorModel> Emitter<C> for Envmap<C> {
         };
         let p = self.point(direction);
         Self::per_solid_angle(cells.pdf(p), (PI * p.y).sin())
+    }
+
+    fn power(&self, _color: &C, radius: f64) -> f64 {
+        4.0 * std::f64::consts::PI.powi(2) * radius * radius * self.mean
     }
 }

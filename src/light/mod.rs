@@ -1,6 +1,7 @@
 //! Lights: what emits, how much arrives from where, and how to draw a direction toward it.
 
 mod area;
+mod brightness;
 mod constant;
 mod directional;
 mod envmap;
@@ -18,8 +19,8 @@ use crate::error::Result;
 use crate::family::family;
 use crate::interaction::Interaction;
 use crate::math::{Frame, Transform};
-use crate::shape::Geometry;
-use crate::texture::Palettes;
+use crate::shape::{Geometry, SurfaceSample};
+use crate::texture::{Palettes, Texture};
 
 /// A direction drawn toward a light.
 #[derive(Clone, Copy, Debug)]
@@ -52,6 +53,12 @@ pub trait Emitter<C: ColorModel>: std::fmt::Debug + Send + Sync {
     }
     /// The density with which [`Emitter::sample`] draws the surface point `at` from `from`.
     fn surface_pdf(&self, _from: Vec3, _at: &Interaction<'_>) -> f32 {
+        0.0
+    }
+
+    /// All light that it gives to a scene of this radius, in any unit that is the same for all lights; 0 for
+    /// one that cannot be drawn. Which light is drawn goes by it, so that it need not be exact.
+    fn power(&self, _color: &C, _radius: f64) -> f64 {
         0.0
     }
 
@@ -111,6 +118,49 @@ fn rotation(properties: &Properties<'_>) -> Result<Mat3> {
         Err(properties
             .error("to_world", "an environment cannot be stretched or sheared")
             .help("leave a rotation"))
+    }
+}
+
+/// The mean of a path's channels in use.
+fn mean_lane<C: ColorModel>(color: &C, sample: C::Sample) -> f64 {
+    let unit = color.unit();
+    let (mut sum, mut count) = (0.0, 0.0);
+    for i in 0..C::Sample::LANES {
+        sum += f64::from(sample[i].abs() * unit[i]);
+        count += f64::from(unit[i]);
+    }
+    sum / count
+}
+
+/// The mean of a stored colour over its channels, and over enough wavelengths to meet a narrow line.
+fn mean_of<C: ColorModel>(color: &C, stored: &C::Stored) -> f64 {
+    const SHIFTS: u16 = 64;
+    let shift = |i| (f32::from(i) + 0.5) / f32::from(SHIFTS);
+    let value = |i| mean_lane(color, C::evaluate(stored, &color.wavelengths(shift(i))));
+    (0..SHIFTS).map(value).sum::<f64>() / f64::from(SHIFTS)
+}
+
+/// The mean of a texture over the unit square.
+fn mean_over_square<C: ColorModel>(color: &C, texture: &Texture<C>) -> f64 {
+    const SIDE: u16 = 64;
+    let wavelengths = color.wavelengths(0.5);
+    let along = |i| (f32::from(i) + 0.5) / f32::from(SIDE);
+    let points = (0..SIDE).flat_map(|y| (0..SIDE).map(move |x| Vec2::new(along(x), along(y))));
+    let value = |uv| mean_lane(color, texture.eval(&Interaction::at_uv(uv), &wavelengths));
+    points.map(value).sum::<f64>() / f64::from(SIDE).powi(2)
+}
+
+/// A point of a shape as a texture sees it.
+fn interaction<'s>(shape: &'s Geometry, point: &SurfaceSample) -> Interaction<'s> {
+    let normal = match shape {
+        Geometry::Mesh(mesh) => mesh.triangle_normal(point.primitive),
+        _ => point.normal,
+    };
+    Interaction {
+        primitive: point.primitive,
+        barycentric: point.barycentric,
+        mesh: shape.mesh(),
+        ..texture_point(point.position, normal, point.uv)
     }
 }
 

@@ -1,8 +1,10 @@
 //! `point`: light from the point `position` (or the origin of `to_world`), `intensity` in each direction.
 
+use std::f64::consts::PI;
+
 use glam::{Vec2, Vec3};
 
-use super::{Emitter, LightContext, LightSample, to_world};
+use super::{Emitter, LightContext, LightSample, mean_of, to_world};
 use crate::color::{Color, ColorModel, Role};
 use crate::description::Properties;
 use crate::error::Result;
@@ -57,5 +59,9 @@ impl<C: ColorModel> Emitter<C> for Point<C> {
             pdf: 1.0,
             delta: true,
         })
+    }
+
+    fn power(&self, color: &C, _radius: f64) -> f64 {
+        4.0 * PI * mean_of(color, &self.intensity)
     }
 }

@@ -2,11 +2,11 @@
 //! field of view `fov`, `fov_axis` or `focal_length` as of a `perspective` sensor with the image's aspect. A
 //! plane at distance 1 across the axis gets π times the image's values, at distance z that over z².
 
-use std::f32::consts::PI;
+use std::f64::consts::PI;
 
 use glam::{Vec2, Vec3};
 
-use super::{Emitter, LightContext, LightSample, texture_point, to_world};
+use super::{Emitter, LightContext, LightSample, mean_over_square, texture_point, to_world};
 use crate::color::{Color, ColorModel, Role};
 use crate::description::Properties;
 use crate::error::Result;
@@ -69,9 +69,14 @@ impl<C: ColorModel> Emitter<C> for Projector<C> {
         Some(LightSample {
             direction,
             target: Some(position),
-            radiance: image * (PI * self.scale / (local.z * local.z * cosine)),
+            radiance: image * (PI as f32 * self.scale / (local.z * local.z * cosine)),
             pdf: 1.0,
             delta: true,
         })
+    }
+
+    fn power(&self, color: &C, _radius: f64) -> f64 {
+        let area = 4.0 * f64::from(self.half.x * self.half.y);
+        PI * area * f64::from(self.scale) * mean_over_square(color, &self.image)
     }
 }

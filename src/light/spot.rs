@@ -2,9 +2,13 @@
 //! `beam_width` (¾ of the cutoff by default) and from there falling with the angle to nothing at
 //! `cutoff_angle` (20), both in degrees from the axis. `texture` is a slide that just fills the cutoff.
 
+use std::f64::consts::PI;
+
 use glam::{Vec2, Vec3};
 
-use super::{Emitter, LightContext, LightSample, texture_point, to_world};
+use super::{
+    Emitter, LightContext, LightSample, mean_of, mean_over_square, texture_point, to_world,
+};
 use crate::color::{Color, ColorModel, Role};
 use crate::description::{Kind, Properties};
 use crate::error::Result;
@@ -101,5 +105,16 @@ impl<C: ColorModel> Emitter<C> for Spot<C> {
             pdf: 1.0,
             delta: true,
         })
+    }
+
+    fn power(&self, color: &C, _radius: f64) -> f64 {
+        // Half of what is between the beam and the cutoff.
+        let cap = |angle: f32| 1.0 - f64::from(angle).cos();
+        let solid_angle = PI * (cap(self.beam) + cap(self.cutoff));
+        let slide = self
+            .slide
+            .as_ref()
+            .map_or(1.0, |slide| mean_over_square(color, slide));
+        solid_angle * slide * mean_of(color, &self.intensity)
     }
 }

@@ -53,17 +53,8 @@ pub fn uniform_triangle(u: Vec2) -> Vec2 {
     }
 }
 
-/// Uniform on the directions within an angle of +z given by 1 − cos θ_max, density
-/// [`uniform_cone_pdf`]. The argument is not the cosine itself, which rounds to 1 for small cones.
-#[inline]
-pub fn uniform_cone(u: Vec2, one_minus_cos: f32) -> Vec3 {
-    let drop = u.x * one_minus_cos;
-    let sin = (drop * (2.0 - drop)).max(0.0).sqrt();
-    let (s, c) = (TAU * u.y).sin_cos();
-    Vec3::new(sin * c, sin * s, 1.0 - drop)
-}
-
-/// 1 / (2π (1 − cos θ_max)).
+/// Density of the directions within θ_max of an axis, 1 / (2π (1 − cos θ_max)), by 1 − cos θ_max: the cosine
+/// itself rounds to 1 for small cones.
 #[inline]
 pub fn uniform_cone_pdf(one_minus_cos: f32) -> f32 {
     1.0 / (2.0 * PI * one_minus_cos)
@@ -83,13 +74,12 @@ mod tests {
 
     #[test]
     fn warps_have_the_moments_of_their_densities() {
-        // E[z] and E[z²]: 2/3, 1/2 for the cosine; 0, 1/3 for the sphere; 1 − d/2 for a cone of drop d.
+        // E[z] and E[z²]: 2/3, 1/2 for the cosine; 0, 1/3 for the sphere.
         let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-3, "{a} {b}");
         near(mean(|u| f64::from(cosine_hemisphere(u).z)), 2.0 / 3.0);
         near(mean(|u| f64::from(cosine_hemisphere(u).z.powi(2))), 0.5);
         near(mean(|u| f64::from(uniform_sphere(u).z)), 0.0);
         near(mean(|u| f64::from(uniform_sphere(u).z.powi(2))), 1.0 / 3.0);
-        near(mean(|u| f64::from(uniform_cone(u, 0.3).z)), 0.85);
         near(
             mean(|u| f64::from(concentric_disk(u).length_squared())),
             0.5,
@@ -101,11 +91,7 @@ mod tests {
     #[test]
     fn warped_directions_have_unit_length() {
         for u in [Vec2::ZERO, Vec2::splat(0.5), Vec2::new(0.999_999_94, 0.3)] {
-            for d in [
-                cosine_hemisphere(u),
-                uniform_sphere(u),
-                uniform_cone(u, 1e-6),
-            ] {
+            for d in [cosine_hemisphere(u), uniform_sphere(u)] {
                 assert!((d.length() - 1.0).abs() < 1e-5, "{u} {d}");
             }
         }

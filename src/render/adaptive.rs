@@ -63,9 +63,8 @@ struct Step {
 impl Ladder {
     /// The pilot and the largest step come to `min_spp` and `max_spp`, as far as the sampler's sets allow.
     pub(super) fn new(sampler: &Sampler, adaptive: &Adaptive) -> Self {
-        let wanted = adaptive.min_spp.div_ceil(2 * SETS);
-        let pilot = sampler.sized(wanted);
-        let set = pilot.round_up(wanted);
+        let pilot = sampler.with_count(adaptive.min_spp.div_ceil(2 * SETS));
+        let set = pilot.sample_count();
         let begun = SETS * set;
         let rest = adaptive.max_spp.div_ceil(2).saturating_sub(begun);
         let mut steps: Vec<Step> = Vec::new();
@@ -75,8 +74,8 @@ impl Ladder {
             if size == 0 {
                 break;
             }
-            let sampler = sampler.sized(size);
-            let count = sampler.round_up(size);
+            let sampler = sampler.with_count(size);
+            let count = sampler.sample_count();
             if steps.last().is_none_or(|last| count > last.count) {
                 steps.push(Step { sampler, count });
             }
@@ -90,6 +89,18 @@ impl Ladder {
             steps,
             noise_threshold: adaptive.noise_threshold.into(),
         }
+    }
+
+    /// Whether all sets of the pilot are the same points, in whatever order, so that their spread tells
+    /// nothing: those of `grid`, and of `stratified` without jitter.
+    fn repeats_itself(&self) -> bool {
+        let set = |first: u32| {
+            let point = |i| self.pilot.get_2d(0, first + i, 0).to_array();
+            let mut points: Vec<_> = (0..self.set).map(point).collect();
+            points.sort_by(|a, b| a.partial_cmp(b).expect("coordinates are numbers"));
+            points
+        };
+        set(0) == set(self.set)
     }
 
     /// Samples of each pixel in a half's pilot.
@@ -151,6 +162,12 @@ pub(super) fn render<C: ColorModel>(
     mut keeper: Option<&mut Keeper>,
 ) -> Result<(Summed<Blocks>, Completed, Ladder)> {
     let ladder = Ladder::new(&job.view.sampler, adaptive);
+    if ladder.repeats_itself() {
+        return Err(Error::input(
+            "the sampler's points are the same in every set, so that their spread tells nothing of the noise",
+        )
+        .help("take another --sampler, or --spp in place of --noise-threshold"));
+    }
     let grid = Grid::new(&job.view.film, job.channels().len());
     let passes = ladder.limits()[1].div_ceil(2 * PASS) as usize;
     let pilots = grid.tiles();

@@ -43,10 +43,11 @@ impl Task for Check<'_> {
         let description = self.description;
         let mut problems = Problems::default();
         problems.take(prepare::sensor(description, self.options));
-        for sensor in description.root().children(Kind::Sensor) {
-            problems.take(prepare::view::<C>(description, sensor.node_id()));
-        }
         let mut warnings = description.warnings().to_vec();
+        for sensor in description.root().children(Kind::Sensor) {
+            let view = problems.take(prepare::view::<C>(description, sensor.node_id()));
+            warnings.extend(view.into_iter().flat_map(|view| view.warnings));
+        }
         match problems.take(prepare::load(description, self.progress)) {
             Some(assets) => {
                 warnings.extend_from_slice(assets.warnings());

@@ -63,6 +63,8 @@ pub(super) struct View<C: ColorModel> {
     pub(super) integrator: Integrator<C>,
     /// The plugin's name, for the metadata.
     integrator_name: String,
+    /// What the user should know of it.
+    pub(super) warnings: Vec<Problem>,
 }
 
 /// Everything that a render needs.
@@ -107,8 +109,15 @@ pub(super) fn view<C: ColorModel>(description: &Description, sensor: NodeId) -> 
     let sensor = film
         .as_ref()
         .and_then(|film| problems.take(Sensor::build(&properties, film)));
+    let mut warnings = Vec::new();
     let sampler = match properties.child(Kind::Sampler)? {
-        Some(sampler) => problems.take(Sampler::build(&sampler, &())),
+        Some(child) => {
+            let sampler = problems.take(Sampler::build(&child, &()));
+            if let Some(sampler) = &sampler {
+                warnings.extend(sampler.rounding(&child)?);
+            }
+            sampler
+        }
         None => {
             problems.push(properties.error("", "the sensor has no sampler"));
             None
@@ -129,6 +138,7 @@ pub(super) fn view<C: ColorModel>(description: &Description, sensor: NodeId) -> 
         sampler: sampler.expect(missing),
         integrator: integrator.expect(missing),
         integrator_name,
+        warnings,
     })
 }
 
@@ -242,6 +252,7 @@ pub(super) fn prepare<'k, C: ColorModel>(
     .check(options.memory_limit)?;
     let mut warnings = description.warnings().to_vec();
     warnings.extend(facts.warnings.iter().cloned());
+    warnings.extend(view.warnings.iter().cloned());
     Ok(Job {
         scene: kept
             .scene

@@ -2,7 +2,7 @@
 
 use glam::Vec2;
 
-use super::{PointSet, Sampler, sample_count};
+use super::{PointSet, Sampler, sample_count, units};
 use crate::description::Properties;
 use crate::error::Result;
 use crate::math::random;
@@ -15,7 +15,6 @@ pub struct Independent {
 
 impl Independent {
     pub(super) fn build(properties: &Properties<'_>, _context: &()) -> Result<Self> {
-        properties.ignore("seed"); // the render's seed is the command line's
         Ok(Self {
             count: sample_count(properties)?,
         })
@@ -31,21 +30,21 @@ impl PointSet for Independent {
         1
     }
 
-    fn sized(&self, count: u32) -> Sampler {
+    fn counts(&self) -> &'static str {
+        "every number"
+    }
+
+    fn with_count(&self, count: u32) -> Sampler {
         Sampler::Independent(Self { count })
     }
 
     #[inline]
     fn get_1d(&self, key: u64, index: u32, dimension: u32) -> f32 {
-        random::unit(random::bits(random::key(key, u64::from(index)), dimension))
+        random::unit(random::bits(random::bits(key, dimension), index))
     }
 
     #[inline]
     fn get_2d(&self, key: u64, index: u32, dimension: u32) -> Vec2 {
-        let key = random::key(key, u64::from(index));
-        Vec2::new(
-            random::unit(random::bits(key, dimension)),
-            random::unit(random::bits(key, dimension + 1)),
-        )
+        units(random::bits(random::bits(key, dimension), index))
     }
 }

@@ -4,13 +4,22 @@
 //! dimension), and inside a set the strata are visited in a keyed permutation, so that every prefix of a
 //! set is unbiased.
 
+mod digits;
+mod grid;
 mod independent;
+mod ldsampler;
+mod multijitter;
+mod orthogonal;
+mod poisson;
+mod sobol;
 mod stratified;
+#[cfg(test)]
+mod tests;
 
 use glam::Vec2;
 
 use crate::description::Properties;
-use crate::error::Result;
+use crate::error::{Problem, Result};
 use crate::family::family;
 use crate::math::random;
 
@@ -18,14 +27,16 @@ use crate::math::random;
 pub trait PointSet: std::fmt::Debug + Send + Sync {
     /// The samples a pixel that the scene asks for, a multiple of the set's size.
     fn sample_count(&self) -> u32;
-    /// How many points make a set.
+    /// How many points make a set; sets are independent of each other.
     fn set_size(&self) -> u32;
-    /// The same sampler for about `count` samples a pixel, at least 1: its sets are as large as that allows.
-    fn sized(&self, count: u32) -> Sampler;
+    /// The sample counts that are not rounded up, in words.
+    fn counts(&self) -> &'static str;
+    /// The same sampler for another count, 1 to [`MAX_SAMPLES`], which it may round up.
+    fn with_count(&self, count: u32) -> Sampler;
     /// Coordinate `dimension` of point `index` (counted over all sets of a pixel) in [0, 1); `key` is
     /// the pixel's.
     fn get_1d(&self, key: u64, index: u32, dimension: u32) -> f32;
-    /// Coordinates `dimension` and `dimension + 1`, placed as a pair.
+    /// Coordinates `dimension`, which is even, and `dimension + 1`, placed as a pair.
     fn get_2d(&self, key: u64, index: u32, dimension: u32) -> Vec2;
 }
 
@@ -33,21 +44,47 @@ family! {
     /// Every sampler there is.
     #[derive(Clone, Debug)]
     pub enum Sampler: PointSet, kind "sampler", context () {
+        "grid" => Grid(grid::Grid),
         "independent" => Independent(independent::Independent),
+        "ldsampler" => LdSampler(ldsampler::LdSampler),
+        "multijitter" => MultiJitter(multijitter::MultiJitter),
+        "orthogonal" => Orthogonal(orthogonal::Orthogonal),
+        "poisson" => Poisson(poisson::Poisson),
+        "sobol" => Sobol(sobol::Sobol),
         "stratified" => Stratified(stratified::Stratified),
     }
 }
 
 impl Sampler {
-    /// The samples a pixel that whole sets make of `wanted`.
-    pub fn round_up(&self, wanted: u32) -> u32 {
-        let set = self.set_size();
-        wanted.div_ceil(set).saturating_mul(set)
+    /// The same sampler with its samples parted, for an error to be estimated from: of its
+    /// `sample_count()` = m, the samples 0..m, m..2m, … of a pixel are independent of each other, and
+    /// `parts` of them are at least as many as this sampler takes. `None` for more parts than samples.
+    ///
+    /// Parts are rounded up one by one: 100 stratified samples in four parts are four times 25, and 64 are
+    /// four times 16, but 100 `sobol` samples, which are 128, become four times 32.
+    pub fn parted(&self, parts: u32) -> Option<Sampler> {
+        let count = self.sample_count();
+        (1..=count)
+            .contains(&parts)
+            .then(|| self.with_count(count.div_ceil(parts)))
+    }
+
+    /// The note that the count which `properties` ask for was rounded up, where it was.
+    pub fn rounding(&self, properties: &Properties<'_>) -> Result<Option<Problem>> {
+        let (wanted, count) = (sample_count(properties)?, self.sample_count());
+        let name = properties.plugin();
+        let error = properties.error(
+            "sample_count",
+            format!("{wanted} samples a pixel are rounded up to {count}"),
+        );
+        let error = error.help(format!("{name} takes {}", self.counts()));
+        Ok((count != wanted).then(|| error.problems()[0].clone()))
     }
 }
 
-/// `sample_count`, 4 by default; a sampler reads it and may round it up.
+/// `sample_count`, 4 by default; a sampler reads it and may round it up. The `seed` is the command line's.
 fn sample_count(properties: &Properties<'_>) -> Result<u32> {
+    properties.ignore("seed");
     let count = properties.integer("sample_count")?.unwrap_or(4);
     u32::try_from(count)
         .ok()
@@ -63,7 +100,34 @@ fn sample_count(properties: &Properties<'_>) -> Result<u32> {
 /// The most samples a pixel can have.
 pub const MAX_SAMPLES: u32 = 1 << 30;
 
+/// A key of its own for each set and dimension, and the point's index in its set of `n`.
+#[inline]
+fn place(key: u64, index: u32, n: u32, dimension: u32) -> (u64, u32) {
+    let set = index / n;
+    (
+        random::bits(random::bits(key, dimension), set),
+        index - set * n,
+    )
+}
+
+/// Two numbers in [0, 1), each uniform on multiples of 2⁻²⁴.
+#[inline]
+fn units(bits: u64) -> Vec2 {
+    Vec2::new(random::unit(bits), random::unit(bits << 32))
+}
+
+/// The largest number below 1: coordinates that rounding brings to 1 are put here.
+#[inline]
+fn below_one() -> f32 {
+    1f32.next_down()
+}
+
 /// One sample's place in the sequence of its pixel, and how many dimensions it has used.
+///
+/// A path's dimensions are the same whatever it meets: 0 and 1 for the place in the pixel, 2 and 3 for the
+/// lens, 4 for the time, 5 for the wavelength; from 8 on each bounce has its own, which its integrator lays
+/// out. Pairs begin at even dimensions: a draw that would begin one at an odd dimension leaves that out. Four
+/// dimensions from a multiple of four on may be placed jointly, so what is decided together belongs there.
 #[derive(Clone, Copy, Debug)]
 pub struct Stream {
     key: u64,
@@ -82,8 +146,16 @@ impl Stream {
         }
     }
 
-    /// Goes to a dimension, such as the first of a bounce.
+    /// Goes on to a dimension, such as the first of a bounce.
+    ///
+    /// # Panics
+    /// If it was used: a bounce would get its numbers again.
+    #[inline]
     pub fn seek(&mut self, dimension: u32) {
+        assert!(
+            dimension >= self.dimension,
+            "a bounce draws from dimensions of its own"
+        );
         self.dimension = dimension;
     }
 
@@ -97,84 +169,8 @@ impl Stream {
     /// The next pair in [0, 1)².
     #[inline]
     pub fn next_2d(&mut self, sampler: &Sampler) -> Vec2 {
-        self.dimension += 2;
-        sampler.get_2d(self.key, self.index, self.dimension - 2)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::description::{Description, Kind, Options};
-    use std::path::Path;
-
-    /// Every sampler of the family, for about `count` samples.
-    fn every_sampler(count: u32) -> impl Iterator<Item = (&'static str, Sampler)> {
-        Sampler::NAMES.iter().map(move |name| {
-            let text = format!(
-                r#"<scene version="3.0.0"><sampler type="{name}"><integer name="sample_count" value="{count}"/></sampler></scene>"#
-            );
-            let scene = Description::parse(&text, Path::new("test.xml"), &Options::default()).unwrap();
-            let child = scene.root().children(Kind::Sampler)[0];
-            (*name, Sampler::build(&child, &()).unwrap())
-        })
-    }
-
-    #[test]
-    fn every_sampler_fills_the_unit_square_evenly_and_repeats_itself() {
-        for (name, sampler) in every_sampler(1000) {
-            assert!(
-                sampler.sample_count() >= 1000 && sampler.sample_count() % sampler.set_size() == 0
-            );
-            for dimension in [0, 5, 40] {
-                let n = sampler.sample_count();
-                let points: Vec<Vec2> = (0..n).map(|i| sampler.get_2d(9, i, dimension)).collect();
-                assert!(
-                    points
-                        .iter()
-                        .all(|p| (0.0..1.0).contains(&p.x) && (0.0..1.0).contains(&p.y)),
-                    "{name}"
-                );
-                let mean = points.iter().sum::<Vec2>() / n as f32;
-                // Five standard deviations of independent points.
-                let tolerance = 5.0 * 0.289 / (n as f32).sqrt();
-                assert!(
-                    (mean - Vec2::splat(0.5)).abs().max_element() < tolerance,
-                    "{name}: {mean}"
-                );
-                let again: Vec<Vec2> = (0..n).map(|i| sampler.get_2d(9, i, dimension)).collect();
-                assert_eq!(points, again, "{name}");
-                let other: Vec<Vec2> = (0..n).map(|i| sampler.get_2d(10, i, dimension)).collect();
-                assert_ne!(points, other, "{name} gives two pixels the same points");
-            }
-        }
-    }
-
-    #[test]
-    fn prefixes_of_every_sampler_are_unbiased() {
-        for (name, sampler) in every_sampler(64) {
-            let keys = 4000;
-            let sum: f64 = (0..keys)
-                .map(|k| f64::from(sampler.get_1d(random::key(3, k), 0, 2)))
-                .sum();
-            assert!(
-                (sum / keys as f64 - 0.5).abs() < 5.0 * 0.289 / (keys as f64).sqrt(),
-                "{name}"
-            );
-        }
-    }
-
-    #[test]
-    fn stratified_points_lie_one_in_each_stratum() {
-        let (_, sampler) = every_sampler(64)
-            .find(|(name, _)| *name == "stratified")
-            .unwrap();
-        let (mut cells, mut intervals) = ([0; 64], [0; 64]);
-        for i in 64..128 {
-            let p = sampler.get_2d(4, i, 6) * 8.0;
-            cells[p.x as usize + 8 * p.y as usize] += 1;
-            intervals[(sampler.get_1d(4, i, 3) * 64.0) as usize] += 1;
-        }
-        assert_eq!((cells, intervals), ([1; 64], [1; 64]));
+        let dimension = self.dimension.next_multiple_of(2);
+        self.dimension = dimension + 2;
+        sampler.get_2d(self.key, self.index, dimension)
     }
 }

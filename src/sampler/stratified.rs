@@ -4,7 +4,7 @@
 
 use glam::Vec2;
 
-use super::{PointSet, Sampler, sample_count};
+use super::{PointSet, Sampler, below_one, place, sample_count, units};
 use crate::description::Properties;
 use crate::error::Result;
 use crate::math::random;
@@ -18,35 +18,20 @@ pub struct Stratified {
     jitter: bool,
 }
 
-/// The side of the smallest square of at least `count` cells.
-fn side(count: u32) -> u32 {
-    let side = count.isqrt();
-    side + u32::from(side.pow(2) < count)
-}
-
 impl Stratified {
     pub(super) fn build(properties: &Properties<'_>, _context: &()) -> Result<Self> {
-        properties.ignore("seed"); // the render's seed is the command line's
-        Ok(Self {
-            side: side(sample_count(properties)?),
-            jitter: properties.boolean("jitter")?.unwrap_or(true),
-        })
+        let count = sample_count(properties)?;
+        Ok(Self::new(
+            count,
+            properties.boolean("jitter")?.unwrap_or(true),
+        ))
     }
 
-    /// The set's key for a dimension, and the point's place in the set's permutation of the strata.
-    #[inline]
-    fn stratum(&self, key: u64, index: u32, dimension: u32) -> (u64, u32) {
-        let n = self.set_size();
-        let key = random::bits(random::key(key, u64::from(index / n)), dimension);
-        (key, random::permute(index % n, n, key))
-    }
-
-    #[inline]
-    fn jitter(&self, key: u64, stratum: u32, axis: u32) -> f32 {
-        if self.jitter {
-            random::unit(random::bits(random::key(key, u64::from(stratum)), axis))
-        } else {
-            0.5
+    pub(super) fn new(count: u32, jitter: bool) -> Self {
+        let root = count.isqrt();
+        Self {
+            side: root + u32::from(root * root < count),
+            jitter,
         }
     }
 }
@@ -60,23 +45,44 @@ impl PointSet for Stratified {
         self.side * self.side
     }
 
-    fn sized(&self, count: u32) -> Sampler {
-        let side = side(count);
-        Sampler::Stratified(Self { side, ..*self })
+    fn counts(&self) -> &'static str {
+        "squares"
+    }
+
+    fn with_count(&self, count: u32) -> Sampler {
+        Sampler::Stratified(Self::new(count, self.jitter))
     }
 
     #[inline]
     fn get_1d(&self, key: u64, index: u32, dimension: u32) -> f32 {
-        let (key, stratum) = self.stratum(key, index, dimension);
-        let x = (stratum as f32 + self.jitter(key, stratum, 0)) / self.set_size() as f32;
-        x.min(1f32.next_down())
+        jittered(key, index, dimension, self.set_size(), self.jitter)
     }
 
     #[inline]
     fn get_2d(&self, key: u64, index: u32, dimension: u32) -> Vec2 {
-        let (key, stratum) = self.stratum(key, index, dimension);
+        let n = self.set_size();
+        let (key, index) = place(key, index, n, dimension);
+        let stratum = random::permute(index, n, key);
         let cell = Vec2::new((stratum % self.side) as f32, (stratum / self.side) as f32);
-        let within = Vec2::new(self.jitter(key, stratum, 0), self.jitter(key, stratum, 1));
-        ((cell + within) / self.side as f32).min(Vec2::splat(1f32.next_down()))
+        let within = offset(key, stratum, self.jitter);
+        ((cell + within) / self.side as f32).min(Vec2::splat(below_one()))
+    }
+}
+
+/// One coordinate in a stratum of its own for each of the `n` points of a set.
+#[inline]
+pub(super) fn jittered(key: u64, index: u32, dimension: u32, n: u32, jitter: bool) -> f32 {
+    let (key, index) = place(key, index, n, dimension);
+    let stratum = random::permute(index, n, key);
+    ((stratum as f32 + offset(key, stratum, jitter).x) / n as f32).min(below_one())
+}
+
+/// Where a point lies within its stratum.
+#[inline]
+pub(super) fn offset(key: u64, stratum: u32, jitter: bool) -> Vec2 {
+    if jitter {
+        units(random::bits(key, stratum))
+    } else {
+        Vec2::splat(0.5)
     }
 }

@@ -5,6 +5,7 @@ use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
 use super::assets::Member;
+use super::choice::Choice;
 use super::{Assets, LightId, MaterialId, Scene, Surfacing};
 use crate::accel::{Method, Tracer};
 use crate::color::ColorModel;
@@ -194,11 +195,13 @@ pub fn build<C: ColorModel>(
         assets.instances.clone(),
         method,
     );
+    let choice = Choice::new(&lights, &color, tracer.bounds());
     Ok(Scene {
         color,
         tracer,
         materials,
         lights,
+        choice,
         environment: environment.map(|(id, _)| id),
         surfacing,
     })

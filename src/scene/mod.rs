@@ -3,6 +3,7 @@
 
 mod assets;
 mod build;
+mod choice;
 
 use glam::{Vec2, Vec3};
 
@@ -11,6 +12,8 @@ use crate::color::{ColorModel, Spectral};
 use crate::interaction::{Hit, Interaction, Ray};
 use crate::light::{Light, LightSample};
 use crate::material::Material;
+
+use choice::Choice;
 
 pub use assets::Assets;
 pub use build::{build, check_materials};
@@ -37,6 +40,7 @@ pub struct Scene<C: ColorModel> {
     tracer: Tracer,
     materials: Vec<Material<C>>,
     lights: Vec<Light<C>>,
+    choice: Choice,
     environment: Option<LightId>,
     /// By shape.
     surfacing: Vec<Surfacing>,
@@ -88,20 +92,8 @@ impl<C: ColorModel> Scene<C> {
         &self.materials[self.surfacing[at.shape as usize].material.0 as usize]
     }
 
-    /// The light that a point belongs to.
-    fn light_at(&self, at: &Interaction<'_>) -> Option<&Light<C>> {
-        self.surfacing[at.shape as usize]
-            .light
-            .map(|id| self.light(id))
-    }
-
     fn light(&self, id: LightId) -> &Light<C> {
         &self.lights[id.0 as usize]
-    }
-
-    /// The probability with which a light is chosen: all alike.
-    fn choice(&self) -> f32 {
-        1.0 / self.lights.len() as f32
     }
 
     /// A direction toward one of the lights from `from`; `u1` chooses the light. The density includes
@@ -113,13 +105,10 @@ impl<C: ColorModel> Scene<C> {
         u2: Vec2,
         w: &C::Wavelengths,
     ) -> Option<LightSample<C::Sample>> {
-        let chosen = (u1 * self.lights.len() as f32) as usize;
-        let light = self
-            .lights
-            .get(chosen.min(self.lights.len().checked_sub(1)?))?;
-        let sample = light.sample(from, u2, w)?;
+        let chosen = self.choice.sample(u1)?;
+        let sample = self.light(chosen).sample(from, u2, w)?;
         Some(LightSample {
-            pdf: sample.pdf * self.choice(),
+            pdf: sample.pdf * self.choice.probability(chosen),
             ..sample
         })
     }
@@ -132,15 +121,23 @@ impl<C: ColorModel> Scene<C> {
         from: Vec3,
         w: &C::Wavelengths,
     ) -> Option<(C::Sample, f32)> {
-        let light = self.light_at(at)?;
+        let id = self.surfacing[at.shape as usize].light?;
+        let light = self.light(id);
         let radiance = light.surface_radiance(at, w);
-        (!radiance.is_black()).then(|| (radiance, light.surface_pdf(from, at) * self.choice()))
+        (!radiance.is_black()).then(|| {
+            let pdf = light.surface_pdf(from, at) * self.choice.probability(id);
+            (radiance, pdf)
+        })
     }
 
     /// The same for a direction in which a ray meets nothing.
     pub fn surrounding(&self, direction: Vec3, w: &C::Wavelengths) -> Option<(C::Sample, f32)> {
-        let light = self.light(self.environment?);
+        let id = self.environment?;
+        let light = self.light(id);
         let radiance = light.environment_radiance(direction, w);
-        (!radiance.is_black()).then(|| (radiance, light.environment_pdf(direction) * self.choice()))
+        (!radiance.is_black()).then(|| {
+            let pdf = light.environment_pdf(direction) * self.choice.probability(id);
+            (radiance, pdf)
+        })
     }
 }

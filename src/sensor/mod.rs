@@ -3,6 +3,7 @@
 mod film;
 mod orthographic;
 mod perspective;
+mod thinlens;
 
 use glam::{DMat4, Mat4, Vec2, Vec3};
 
@@ -34,6 +35,7 @@ family! {
     pub enum Sensor: Camera, kind "sensor", context Film {
         "orthographic" => Orthographic(orthographic::Orthographic),
         "perspective" => Perspective(perspective::Perspective),
+        "thinlens" => ThinLens(thinlens::ThinLens),
     }
 }
 

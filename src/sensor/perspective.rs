@@ -85,14 +85,26 @@ impl Perspective {
             ),
         })
     }
+
+    /// The ray that leaves the camera-space point `lens` for where the pinhole's ray has depth `focus`.
+    pub(super) fn ray_through(&self, film: Vec2, lens: Vec2, focus: f32, time: f32) -> Ray {
+        let p = (Vec2::ONE - 2.0 * (film - self.principal_point)) * self.half;
+        // At depth 1; from the lens's centre it is the pinhole's own.
+        let way = (p - lens / focus).extend(1.0);
+        let start = lens.extend(0.0);
+        let Mount { near, far, .. } = self.mount;
+        self.mount.ray(start + way * near, start + way * far, time)
+    }
+
+    /// The far clipping distance.
+    pub(super) fn far(&self) -> f32 {
+        self.mount.far
+    }
 }
 
 impl Camera for Perspective {
     fn ray(&self, film: Vec2, _lens: Vec2, time: f32) -> Ray {
-        let p = (Vec2::ONE - 2.0 * (film - self.principal_point)) * self.half;
-        let way = p.extend(1.0);
-        self.mount
-            .ray(way * self.mount.near, way * self.mount.far, time)
+        self.ray_through(film, Vec2::ZERO, 1.0, time)
     }
 
     fn world_to_camera(&self) -> Mat4 {

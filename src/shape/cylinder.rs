@@ -7,7 +7,9 @@ use std::f32::consts::TAU;
 use glam::{DAffine3, DVec2, DVec3, Vec2, Vec3};
 
 use super::disk::turns;
-use super::{Bounds, Geometry, Shape, Surface, SurfaceSample, area_to_solid_angle, to_world};
+use super::{
+    Bounds, Chart, Geometry, Shape, Surface, SurfaceSample, area_to_solid_angle, to_world,
+};
 use crate::description::Properties;
 use crate::error::Result;
 use crate::interaction::{Hit, Interaction, Ray};
@@ -84,10 +86,22 @@ impl Cylinder {
         (largest + self.to_world.translation.abs()).as_vec3() * offset::gamma(3)
     }
 
-    /// Density per solid angle of a point drawn uniformly in angle and height.
-    fn density(&self, from: Vec3, position: Vec3, around: DVec2, normal: Vec3) -> f32 {
-        let area = std::f64::consts::TAU * self.stretch(around);
-        area_to_solid_angle(area, from, position, normal)
+    /// The place with these texture coordinates.
+    fn at(&self, uv: Vec2) -> Chart {
+        let around = DVec2::from_angle(f64::from(TAU * uv.x));
+        let local = around.extend(f64::from(uv.y));
+        let point = SurfaceSample {
+            position: self.to_world.transform_point3(local).as_vec3(),
+            normal: self.normal(around),
+            uv,
+            primitive: 0,
+            barycentric: Vec2::ZERO,
+            pdf: 0.0,
+        };
+        Chart {
+            point,
+            stretch: std::f64::consts::TAU * self.stretch(around),
+        }
     }
 
     /// The unit cylinder's point next to a world position: around the axis, and the height.
@@ -168,24 +182,21 @@ impl Surface for Cylinder {
     }
 
     fn sample(&self, from: Vec3, u: Vec2) -> Option<SurfaceSample> {
-        let around = DVec2::from_angle(f64::from(TAU * u.x));
-        let local = around.extend(f64::from(u.y));
-        let position = self.to_world.transform_point3(local).as_vec3();
-        let normal = self.normal(around);
-        let pdf = self.density(from, position, around, normal);
-        (pdf > 0.0).then_some(SurfaceSample {
-            position,
-            normal,
-            uv: u,
-            primitive: 0,
-            barycentric: Vec2::ZERO,
-            pdf,
-        })
+        let Chart { point, stretch } = self.at(u);
+        let pdf = area_to_solid_angle(stretch, from, point.position, point.normal);
+        (pdf > 0.0).then_some(SurfaceSample { pdf, ..point })
+    }
+
+    /// By texture coordinates.
+    fn chart(&self, parameters: Vec2) -> Option<Chart> {
+        Some(self.at(parameters))
     }
 
     fn pdf(&self, from: Vec3, at: &Interaction<'_>) -> f32 {
         let (around, _) = self.local(at.position.as_dvec3());
-        self.density(from, at.position, around, at.normal)
+        // Drawn uniformly in angle and height.
+        let area = std::f64::consts::TAU * self.stretch(around);
+        area_to_solid_angle(area, from, at.position, at.normal)
     }
 
     fn bytes(&self) -> usize {

@@ -5,7 +5,9 @@ use std::f32::consts::TAU;
 
 use glam::{DAffine3, Vec2, Vec3};
 
-use super::{Bounds, Geometry, Shape, Surface, SurfaceSample, area_to_solid_angle, to_world};
+use super::{
+    Bounds, Chart, Geometry, Shape, Surface, SurfaceSample, area_to_solid_angle, to_world,
+};
 use crate::description::Properties;
 use crate::error::Result;
 use crate::interaction::{Hit, Interaction, Ray};
@@ -46,6 +48,18 @@ pub(super) fn build(properties: &Properties<'_>) -> Result<Shape> {
 impl Disk {
     fn position(&self, p: Vec2) -> Vec3 {
         self.center + self.axes[0] * p.x + self.axes[1] * p.y
+    }
+
+    /// The point there, without a density.
+    fn at(&self, p: Vec2) -> SurfaceSample {
+        SurfaceSample {
+            position: self.position(p),
+            normal: self.normal,
+            uv: Self::uv(p),
+            primitive: 0,
+            barycentric: Vec2::ZERO,
+            pdf: 0.0,
+        }
     }
 
     fn uv(p: Vec2) -> Vec2 {
@@ -117,20 +131,22 @@ impl Surface for Disk {
 
     fn sample(&self, from: Vec3, u: Vec2) -> Option<SurfaceSample> {
         let p = warp::concentric_disk(u);
-        let position = self.position(p);
-        let pdf = area_to_solid_angle(self.area, from, position, self.normal);
-        (pdf > 0.0).then(|| SurfaceSample {
-            position,
-            normal: self.normal,
-            uv: Self::uv(p),
-            primitive: 0,
-            barycentric: Vec2::ZERO,
-            pdf,
-        })
+        let sample = self.at(p);
+        let pdf = area_to_solid_angle(self.area, from, sample.position, self.normal);
+        (pdf > 0.0).then_some(SurfaceSample { pdf, ..sample })
     }
 
     fn pdf(&self, from: Vec3, at: &Interaction<'_>) -> f32 {
         area_to_solid_angle(self.area, from, at.position, at.normal)
+    }
+
+    /// By texture coordinates.
+    fn chart(&self, parameters: Vec2) -> Option<Chart> {
+        let p = parameters.x * Vec2::from_angle(TAU * parameters.y);
+        Some(Chart {
+            point: self.at(p),
+            stretch: 2.0 * f64::from(parameters.x) * self.area,
+        })
     }
 
     fn bytes(&self) -> usize {

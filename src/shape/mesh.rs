@@ -1,10 +1,14 @@
-//! Triangle meshes as surfaces: boxes, what a hit looks like, and points drawn uniformly over the area.
+//! Triangle meshes as surfaces: boxes, what a hit looks like, and points drawn uniformly over the area, or over
+//! the solid angle of a mesh that is a rectangle.
 
 use std::sync::OnceLock;
 
 use glam::{Vec2, Vec3};
 
-use super::{Bounds, Geometry, Shape, Surface, SurfaceSample, area_to_solid_angle, to_world};
+use super::quad::{Place, Quad};
+use super::{
+    Bounds, Chart, Geometry, Shape, Surface, SurfaceSample, area_to_solid_angle, to_world,
+};
 use crate::description::Properties;
 use crate::error::Result;
 use crate::interaction::{Hit, Interaction, Ray};
@@ -18,12 +22,15 @@ pub struct TriangleMesh {
     mesh: Mesh,
     /// Triangles by area, made when the first light sample asks for it.
     areas: OnceLock<Option<Discrete>>,
+    /// The rectangle that it is, if it is one.
+    quad: Option<Quad>,
 }
 
 impl TriangleMesh {
     /// A mesh whose coordinates are the world's.
     pub fn new(mesh: Mesh) -> Self {
         Self {
+            quad: Quad::of(&mesh),
             mesh,
             areas: OnceLock::new(),
         }
@@ -40,15 +47,47 @@ impl TriangleMesh {
         self.mesh.triangles[triangle as usize].map(|i| self.mesh.positions[i as usize])
     }
 
+    /// A triangle's area, in square units.
+    pub fn triangle_area(&self, triangle: u32) -> f64 {
+        let [a, b, c] = self.corners(triangle).map(Vec3::as_dvec3);
+        0.5 * (b - a).cross(c - a).length()
+    }
+
+    /// A triangle's geometric normal; zero where it has no area.
+    pub fn triangle_normal(&self, triangle: u32) -> Vec3 {
+        Self::geometric_normal(self.corners(triangle))
+    }
+
+    /// A point drawn uniformly over one triangle, without a density.
+    pub fn triangle_point(&self, triangle: u32, u: Vec2) -> SurfaceSample {
+        let b = warp::uniform_triangle(u);
+        self.at(Place {
+            triangle,
+            barycentric: [1.0 - b.x - b.y, b.x, b.y],
+        })
+    }
+
     fn areas(&self) -> Option<&Discrete> {
-        let build = || {
-            let area = |t: u32| {
-                let [a, b, c] = self.corners(t).map(Vec3::as_dvec3);
-                0.5 * (b - a).cross(c - a).length()
-            };
-            Discrete::new((0..self.primitive_count()).map(area))
-        };
+        let build = || Discrete::new((0..self.primitive_count()).map(|t| self.triangle_area(t)));
         self.areas.get_or_init(build).as_ref()
+    }
+
+    /// A point of the mesh, not yet with a density.
+    fn at(&self, place: Place) -> SurfaceSample {
+        let Place {
+            triangle,
+            barycentric: b,
+        } = place;
+        let corners = self.corners(triangle);
+        let (normal, uv) = self.shading(triangle, b, self.triangle_normal(triangle));
+        SurfaceSample {
+            position: b[0] * corners[0] + b[1] * corners[1] + b[2] * corners[2],
+            normal,
+            uv,
+            primitive: triangle,
+            barycentric: Vec2::new(b[1], b[2]),
+            pdf: 0.0,
+        }
     }
 
     /// The shading normal and the texture coordinates at a point of a triangle.
@@ -146,28 +185,43 @@ impl Surface for TriangleMesh {
     }
 
     fn sample(&self, from: Vec3, u: Vec2) -> Option<SurfaceSample> {
+        if let Some(quad) = &self.quad
+            && let Some(seen) = quad.seen(from)
+        {
+            return Some(SurfaceSample {
+                pdf: (1.0 / seen.solid_angle) as f32,
+                ..self.at(quad.place(seen.sample(u)))
+            });
+        }
         let areas = self.areas()?;
         let drawn = areas.sample(u.x);
         let triangle = drawn.index as u32;
-        let corners = self.corners(triangle);
-        let b = warp::uniform_triangle(Vec2::new(drawn.rest, u.y));
-        let b = [1.0 - b.x - b.y, b.x, b.y];
-        let position = b[0] * corners[0] + b[1] * corners[1] + b[2] * corners[2];
-        let geometric = Self::geometric_normal(corners);
-        let (normal, uv) = self.shading(triangle, b, geometric);
-        let pdf = area_to_solid_angle(areas.total(), from, position, geometric);
-        (pdf > 0.0).then_some(SurfaceSample {
-            position,
-            normal,
-            uv,
-            primitive: triangle,
-            barycentric: Vec2::new(b[1], b[2]),
-            pdf,
-        })
+        let sample = self.triangle_point(triangle, Vec2::new(drawn.rest, u.y));
+        let normal = self.triangle_normal(triangle);
+        let pdf = area_to_solid_angle(areas.total(), from, sample.position, normal);
+        (pdf > 0.0).then_some(SurfaceSample { pdf, ..sample })
     }
 
     fn pdf(&self, from: Vec3, at: &Interaction<'_>) -> f32 {
-        area_to_solid_angle(self.area(), from, at.position, at.normal)
+        match self.quad.as_ref().and_then(|quad| quad.seen(from)) {
+            Some(seen) => (1.0 / seen.solid_angle) as f32,
+            None => area_to_solid_angle(self.area(), from, at.position, at.normal),
+        }
+    }
+
+    fn chart(&self, parameters: Vec2) -> Option<Chart> {
+        let quad = self.quad.as_ref()?;
+        Some(Chart {
+            point: self.at(quad.place(parameters.as_dvec2())),
+            stretch: quad.area(),
+        })
+    }
+
+    fn parameters(&self, primitive: u32, barycentric: Vec2, uv: Vec2) -> Vec2 {
+        match &self.quad {
+            Some(quad) => quad.fractions(primitive, barycentric),
+            None => uv,
+        }
     }
 
     fn bytes(&self) -> usize {

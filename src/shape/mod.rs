@@ -4,6 +4,7 @@
 mod cylinder;
 mod disk;
 mod mesh;
+mod quad;
 mod sphere;
 
 mod cube;
@@ -103,6 +104,15 @@ pub struct SurfaceSample {
     pub pdf: f32,
 }
 
+/// The place on a surface that belongs to a pair of parameters in [0, 1]².
+#[derive(Clone, Copy, Debug)]
+pub struct Chart {
+    /// Where, without a density.
+    pub point: SurfaceSample,
+    /// How much area, in square units of the scene, a unit of the parameters' square covers there.
+    pub stretch: f64,
+}
+
 /// What every kind of geometry does. Triangles are intersected by `accel` itself, never one by one
 /// through this trait.
 pub trait Surface: std::fmt::Debug + Send + Sync {
@@ -121,6 +131,14 @@ pub trait Surface: std::fmt::Debug + Send + Sync {
     /// The density with which [`Surface::sample`] would have drawn the point `at`, which is visible
     /// from `from`.
     fn pdf(&self, from: Vec3, at: &Interaction<'_>) -> f32;
+    /// The place with these parameters, of a surface that is covered by one square of them.
+    fn chart(&self, _parameters: Vec2) -> Option<Chart> {
+        None
+    }
+    /// The parameters of a place, if there is a [`Surface::chart`].
+    fn parameters(&self, _primitive: u32, _barycentric: Vec2, uv: Vec2) -> Vec2 {
+        uv
+    }
     /// Bytes held.
     fn bytes(&self) -> usize;
 }
@@ -230,7 +248,7 @@ fn to_world(properties: &Properties<'_>) -> Result<DMat4> {
 }
 
 /// Density per solid angle of a point drawn with density 1/`area` over a surface.
-fn area_to_solid_angle(area: f64, from: Vec3, position: Vec3, normal: Vec3) -> f32 {
+pub fn area_to_solid_angle(area: f64, from: Vec3, position: Vec3, normal: Vec3) -> f32 {
     let way = position - from;
     let squared = way.length_squared();
     let cosine = normal.dot(way).abs() / squared.sqrt();

@@ -7,7 +7,9 @@ use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
 use glam::{DVec3, Mat3, Vec2, Vec3};
 
-use super::{Bounds, Geometry, Shape, Surface, SurfaceSample, area_to_solid_angle, to_world};
+use super::{
+    Bounds, Chart, Geometry, Shape, Surface, SurfaceSample, area_to_solid_angle, to_world,
+};
 use crate::description::Properties;
 use crate::error::Result;
 use crate::interaction::{Hit, Interaction, Ray};
@@ -58,12 +60,17 @@ pub(super) fn build(properties: &Properties<'_>) -> Result<Shape> {
 }
 
 impl Sphere {
-    /// 1 − cos of the half angle under which a point sees the sphere; `None` from inside.
-    fn cone(&self, from: Vec3) -> Option<f32> {
-        let squared = (self.center - from).as_dvec3().length_squared();
+    /// The square of the sine of the half angle under which a point sees the sphere; `None` from inside.
+    fn cone(&self, from: Vec3) -> Option<f64> {
+        let squared = (self.center.as_dvec3() - from.as_dvec3()).length_squared();
         let sin2 = f64::from(self.radius).powi(2) / squared;
         // From this close the sphere is sampled by area: the cone's map has no precision left.
-        (sin2 < 0.9999).then(|| (sin2 / (1.0 + (1.0 - sin2).sqrt())) as f32)
+        (sin2 < 0.9999).then_some(sin2)
+    }
+
+    /// 1 − cos of that angle, without the cancellation.
+    fn drop(sin2: f64) -> f64 {
+        sin2 / (1.0 + (1.0 - sin2).sqrt())
     }
 
     fn outward(&self, position: Vec3) -> Vec3 {
@@ -72,6 +79,18 @@ impl Sphere {
 
     fn side(&self) -> f32 {
         if self.flip_normals { -1.0 } else { 1.0 }
+    }
+
+    /// The point in that direction from the centre, without a density.
+    fn at(&self, outward: Vec3, uv: Vec2) -> SurfaceSample {
+        SurfaceSample {
+            position: self.center + self.radius * outward,
+            normal: self.side() * outward,
+            uv,
+            primitive: 0,
+            barycentric: Vec2::ZERO,
+            pdf: 0.0,
+        }
     }
 
     fn uv(&self, outward: Vec3) -> Vec2 {
@@ -162,55 +181,50 @@ impl Surface for Sphere {
     }
 
     fn sample(&self, from: Vec3, u: Vec2) -> Option<SurfaceSample> {
-        let Some(one_minus_cos) = self.cone(from) else {
+        let Some(widest) = self.cone(from) else {
             let outward = warp::uniform_sphere(u);
-            let position = self.center + self.radius * outward;
-            let pdf = area_to_solid_angle(self.area(), from, position, outward);
-            let sample = SurfaceSample {
-                position,
-                normal: self.side() * outward,
-                uv: self.uv(outward),
-                primitive: 0,
-                barycentric: Vec2::ZERO,
-                pdf,
-            };
-            return (pdf > 0.0).then_some(sample);
+            let sample = self.at(outward, self.uv(outward));
+            let pdf = area_to_solid_angle(self.area(), from, sample.position, outward);
+            return (pdf > 0.0).then_some(SurfaceSample { pdf, ..sample });
         };
-        // The direction of the cone's sample, and from it the normal where that direction meets the
-        // sphere (Mitsuba's and PBRT's geometry: the angle α at the centre).
-        let way = self.center - from;
-        let distance = way.length();
-        let cone = warp::uniform_cone(u, one_minus_cos);
-        let (sin2, cos) = (1.0 - cone.z * cone.z, cone.z);
-        let to_hit = distance * cos
-            - (self.radius.powi(2) - distance.powi(2) * sin2)
-                .max(0.0)
-                .sqrt();
-        let cos_alpha = (distance.powi(2) + self.radius.powi(2) - to_hit.powi(2))
-            / (2.0 * distance * self.radius);
+        // A direction at an angle θ from the axis meets the sphere where, at its centre, the angle to the eye
+        // is α; in double precision, for both angles may be tiny (PBRT 4th ed., 6.2.4).
+        let drop = f64::from(u.x) * Self::drop(widest);
+        let sin2 = drop * (2.0 - drop);
+        let cos_alpha = sin2 / widest.sqrt() + (1.0 - drop) * (1.0 - sin2 / widest).max(0.0).sqrt();
         let sin_alpha = (1.0 - cos_alpha * cos_alpha).max(0.0).sqrt();
-        let around = Vec2::new(cone.x, cone.y).normalize_or_zero() * sin_alpha;
-        let frame = Frame::around(way / distance);
+        let (sin, cos) = (TAU * u.y).sin_cos();
+        let sin_alpha = sin_alpha as f32;
+        let frame = Frame::around((self.center - from).normalize());
         let outward = frame
-            .to_world(Vec3::new(around.x, around.y, -cos_alpha))
+            .to_world(Vec3::new(
+                sin_alpha * cos,
+                sin_alpha * sin,
+                -cos_alpha as f32,
+            ))
             .normalize();
-        let pdf = warp::uniform_cone_pdf(one_minus_cos);
-        let position = self.center + self.radius * outward;
         Some(SurfaceSample {
-            position,
-            normal: self.side() * outward,
-            uv: self.uv(outward),
-            primitive: 0,
-            barycentric: Vec2::ZERO,
-            pdf,
+            pdf: warp::uniform_cone_pdf(Self::drop(widest) as f32),
+            ..self.at(outward, self.uv(outward))
         })
     }
 
     fn pdf(&self, from: Vec3, at: &Interaction<'_>) -> f32 {
         match self.cone(from) {
-            Some(one_minus_cos) => warp::uniform_cone_pdf(one_minus_cos),
+            Some(widest) => warp::uniform_cone_pdf(Self::drop(widest) as f32),
             None => area_to_solid_angle(self.area(), from, at.position, at.normal),
         }
+    }
+
+    /// By texture coordinates.
+    fn chart(&self, parameters: Vec2) -> Option<Chart> {
+        let (sin_phi, cos_phi) = (TAU * parameters.x).sin_cos();
+        let (sin, cos) = (PI * parameters.y).sin_cos();
+        let outward = self.rotation * Vec3::new(sin * cos_phi, sin * sin_phi, cos);
+        Some(Chart {
+            point: self.at(outward, parameters),
+            stretch: f64::from(TAU * PI * sin.abs()) * f64::from(self.radius).powi(2),
+        })
     }
 
     fn bytes(&self) -> usize {

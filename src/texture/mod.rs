@@ -7,6 +7,7 @@ mod mesh_attribute;
 mod picture;
 mod rawconstant;
 mod uniform;
+mod zoneplate;
 
 use std::collections::HashMap;
 use std::path::PathBuf;
@@ -49,6 +50,7 @@ family! {
         "mesh_attribute" => MeshAttribute(mesh_attribute::MeshAttribute<C>),
         "rawconstant" => RawConstant(rawconstant::RawConstant<C>),
         "uniform" => Uniform(uniform::Uniform<C>),
+        "zoneplate" => ZonePlate(zoneplate::ZonePlate<C>),
     }
 }
 

@@ -17,6 +17,11 @@ impl<C: ColorModel> Uniform<C> {
         Self { value }
     }
 
+    /// The colour.
+    pub fn value(&self) -> &C::Stored {
+        &self.value
+    }
+
     pub(super) fn build(properties: &Properties<'_>, palette: &Palette<C>) -> Result<Self> {
         let value = properties.float("value")?.unwrap_or(1.0);
         let stored = palette.color.store(&Color::Grey(value), palette.role);

@@ -9,6 +9,7 @@ mod closed_form;
 mod golden;
 mod inputs;
 mod layers;
+mod lights;
 mod mitsuba_data;
 mod resume;
 mod same_bits;

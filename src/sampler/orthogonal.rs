@@ -1,0 +1,131 @@
+//! `orthogonal`: points from orthogonal arrays of strength 2 (Jarosz, Enayet, Kensler, Kilpatrick and
+//! Christensen, *Orthogonal array sampling for Monte Carlo rendering*, 2019). A set of p² points, p prime,
+//! puts one into each cell of a p × p grid in *every* two dimensions of a block, be they a pair or not, and
+//! one into each of p² intervals of every dimension. Bose's construction: point (a, b) has the digits a, b,
+//! a + b, 2a + b, … mod p in the block's dimensions, which are p + 1; permutations of each dimension's
+//! digits, and within a digit's stratum the partner's digit (correlated multi-jitter), do the rest.
+
+use glam::Vec2;
+
+use super::stratified::offset;
+use super::{PointSet, Sampler, below_one, place, sample_count};
+use crate::description::Properties;
+use crate::error::{Error, Result};
+use crate::math::random;
+
+/// A set is the whole sample count, rounded up to the square of a prime.
+#[derive(Clone, Debug)]
+pub struct Orthogonal {
+    prime: u32,
+    /// Dimensions that share an array: an even number, for pairs must not be parted.
+    block: u32,
+    /// Whether points lie anywhere in the smallest strata, or at their centres.
+    jitter: bool,
+}
+
+impl Orthogonal {
+    pub(super) fn build(properties: &Properties<'_>, _context: &()) -> Result<Self> {
+        if let Some(strength) = properties.integer("strength")?.filter(|&s| s != 2) {
+            let message =
+                format!("orthogonal arrays of strength {strength} do not exist in Étendue");
+            return Err(Error::unsupported(message)
+                .at(properties.location())
+                .help("they have strength 2, the default"));
+        }
+        let count = sample_count(properties)?;
+        Ok(Self::new(
+            count,
+            properties.boolean("jitter")?.unwrap_or(true),
+        ))
+    }
+
+    fn new(count: u32, jitter: bool) -> Self {
+        let root = count.isqrt();
+        let least = (root + u32::from(root * root < count)).max(2);
+        let prime = (least..)
+            .find(|&n| is_prime(n))
+            .expect("there is a larger prime");
+        Self {
+            prime,
+            block: (prime + 1) & !1,
+            jitter,
+        }
+    }
+
+    /// The point's number in the array that the block of `dimension` has to itself.
+    #[inline]
+    fn row(&self, key: u64, index: u32, dimension: u32) -> (u64, u32) {
+        let n = self.set_size();
+        let (key, index) = place(key, index, n, dimension / self.block);
+        (key, random::permute(index, n, key))
+    }
+
+    /// A point's digit in a column of the array, before any permutation.
+    #[inline]
+    fn digit(&self, row: u32, column: u32) -> u32 {
+        let (a, b) = (row / self.prime, row % self.prime);
+        match column {
+            0 => a,
+            // Both factors are below 2^15, or a little above: see MAX_SAMPLES.
+            _ => ((column - 1) * a + b) % self.prime,
+        }
+    }
+
+    /// A coordinate from its own digit and that of its partner; `within` is the place in the smallest
+    /// stratum.
+    #[inline]
+    fn coordinate(&self, key: u64, digit: u32, partner: u32, within: f32) -> f32 {
+        let p = self.prime as f32;
+        let stratum = random::permute(digit, self.prime, key);
+        let part = random::permute(partner, self.prime, random::bits(key, 0));
+        ((stratum as f32 + (part as f32 + within) / p) / p).min(below_one())
+    }
+}
+
+impl PointSet for Orthogonal {
+    fn sample_count(&self) -> u32 {
+        self.set_size()
+    }
+
+    fn set_size(&self) -> u32 {
+        self.prime * self.prime
+    }
+
+    fn counts(&self) -> &'static str {
+        "squares of primes"
+    }
+
+    fn with_count(&self, count: u32) -> Sampler {
+        Sampler::Orthogonal(Self::new(count, self.jitter))
+    }
+
+    #[inline]
+    fn get_1d(&self, key: u64, index: u32, dimension: u32) -> f32 {
+        let (key, row) = self.row(key, index, dimension);
+        let column = dimension % self.block;
+        let (digit, partner) = (self.digit(row, column), self.digit(row, column ^ 1));
+        let key = random::bits(key, column);
+        self.coordinate(key, digit, partner, offset(key, row, self.jitter).x)
+    }
+
+    #[inline]
+    fn get_2d(&self, key: u64, index: u32, dimension: u32) -> Vec2 {
+        let (key, row) = self.row(key, index, dimension);
+        let column = dimension % self.block;
+        let (x, y) = (self.digit(row, column), self.digit(row, column + 1));
+        let keys = [random::bits(key, column), random::bits(key, column + 1)];
+        let within = offset(keys[0], row, self.jitter);
+        Vec2::new(
+            self.coordinate(keys[0], x, y, within.x),
+            self.coordinate(keys[1], y, x, within.y),
+        )
+    }
+}
+
+/// By trial division: the numbers are below 2^16.
+fn is_prime(n: u32) -> bool {
+    n >= 2
+        && (2..)
+            .take_while(|d| d * d <= n)
+            .all(|d| !n.is_multiple_of(d))
+}

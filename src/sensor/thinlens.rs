@@ -1,0 +1,285 @@
+//! `thinlens`: a `perspective` camera whose aperture has a size (Cook, Porter and Carpenter, *Distributed ray
+//! tracing*, 1984). All rays through a point of the film meet where the pinhole's ray has the depth
+//! `focus_distance` (`far_clip` by default); a point at depth z is blurred over a disc whose radius on the plane
+//! in focus is r·|focus − z|/z, with the `aperture_radius` r.
+//!
+//! An extension: `aperture_blades` (3 or more; 0, the default, is a disc) makes the aperture a regular polygon
+//! with its corners on that radius, one of them on top; `aperture_rotation` turns it, in degrees, clockwise as
+//! seen from behind the camera.
+
+use std::f32::consts::TAU;
+
+use glam::{Mat4, Vec2};
+
+use super::perspective::Perspective;
+use super::{Camera, Film};
+use crate::description::Properties;
+use crate::error::Result;
+use crate::interaction::Ray;
+use crate::math::warp;
+
+/// A camera with depth of field.
+#[derive(Clone, Debug)]
+pub struct ThinLens {
+    pinhole: Perspective,
+    focus_distance: f32,
+    aperture: Aperture,
+}
+
+/// Where light enters, in camera space at z = 0.
+#[derive(Clone, Debug)]
+struct Aperture {
+    radius: f32,
+    /// Corners of the polygon that the unit circle is around; none for a disc.
+    corners: Vec<Vec2>,
+}
+
+/// The most blades.
+const MAX_BLADES: i64 = 64;
+
+impl Aperture {
+    fn build(properties: &Properties<'_>) -> Result<Self> {
+        let Some(radius) = properties.float("aperture_radius")? else {
+            return Err(properties
+                .error("", "a thinlens needs an aperture_radius")
+                .help("a perspective sensor sees everything sharp"));
+        };
+        if radius < 0.0 {
+            return Err(properties.error(
+                "aperture_radius",
+                format!("a radius cannot be negative, and {radius} is"),
+            ));
+        }
+        let blades = properties.integer("aperture_blades")?.unwrap_or(0);
+        if blades != 0 && !(3..=MAX_BLADES).contains(&blades) {
+            return Err(properties
+                .error(
+                    "aperture_blades",
+                    format!("{blades} blades; 3 to {MAX_BLADES} are possible"),
+                )
+                .help("0 is a disc"));
+        }
+        let rotation = properties.float("aperture_rotation")?.unwrap_or(0.0);
+        let corner = |i: i64| {
+            let angle = rotation.to_radians() as f32 + TAU * i as f32 / blades as f32;
+            // +x is to the image's left.
+            Vec2::new(-angle.sin(), angle.cos())
+        };
+        Ok(Self {
+            radius: radius as f32,
+            corners: (0..blades).map(corner).collect(),
+        })
+    }
+
+    /// A point of the aperture, uniform over it. A polygon's is the disc's at the same share of its sector's
+    /// angle and the same fraction of the way from the centre to the rim: areas stay in proportion, and what
+    /// was near stays near.
+    fn point(&self, u: Vec2) -> Vec2 {
+        let p = warp::concentric_disk(u);
+        let n = self.corners.len();
+        if n == 0 {
+            return self.radius * p;
+        }
+        let turns = p.y.atan2(p.x) / TAU;
+        let sector = (turns - turns.floor()) * n as f32;
+        let i = (sector as usize).min(n - 1);
+        let rim = self.corners[i].lerp(self.corners[(i + 1) % n], sector - i as f32);
+        self.radius * p.length() * rim
+    }
+}
+
+impl ThinLens {
+    pub(super) fn build(properties: &Properties<'_>, film: &Film) -> Result<Self> {
+        let pinhole = Perspective::build(properties, film)?;
+        let focus_distance = match properties.float("focus_distance")? {
+            Some(distance) if distance <= 0.0 => {
+                return Err(properties.error(
+                    "focus_distance",
+                    format!("focus_distance must be positive, and {distance} is not"),
+                ));
+            }
+            Some(distance) => distance as f32,
+            None => pinhole.far(),
+        };
+        Ok(Self {
+            pinhole,
+            focus_distance,
+            aperture: Aperture::build(properties)?,
+        })
+    }
+}
+
+impl Camera for ThinLens {
+    fn ray(&self, film: Vec2, lens: Vec2, time: f32) -> Ray {
+        let lens = self.aperture.point(lens);
+        self.pinhole
+            .ray_through(film, lens, self.focus_distance, time)
+    }
+
+    fn world_to_camera(&self) -> Mat4 {
+        self.pinhole.world_to_camera()
+    }
+
+    fn projection(&self) -> Mat4 {
+        self.pinhole.projection()
+    }
+
+    fn shutter(&self) -> (f32, f32) {
+        self.pinhole.shutter()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use glam::Vec3;
+
+    use super::*;
+    use crate::description::{Description, Kind, Options};
+
+    fn camera(inside: &str) -> Result<ThinLens> {
+        let text =
+            format!(r#"<scene version="3.0.0"><sensor type="thinlens">{inside}</sensor></scene>"#);
+        let scene = Description::parse(&text, Path::new("test.xml"), &Options::default()).unwrap();
+        let film = Film {
+            width: 200,
+            height: 100,
+            ..Film::default()
+        };
+        let camera = ThinLens::build(&scene.root().children(Kind::Sensor)[0], &film)?;
+        assert_eq!(scene.unread(), []);
+        Ok(camera)
+    }
+
+    /// Film, lens, origin, direction and length as Mitsuba 3.9.1 has them.
+    type Probe = ([f32; 2], [f32; 2], [f32; 3], [f32; 3], f32);
+
+    #[test]
+    fn rays_are_those_of_mitsuba() {
+        let camera = camera(
+            r#"<float name="fov" value="40"/><float name="aperture_radius" value="0.3"/>
+            <float name="focus_distance" value="2.5"/><float name="near_clip" value="0.05"/>
+            <float name="far_clip" value="50"/>
+            <transform name="to_world"><lookat origin="1,2,3" target="4,0,1" up="0,0,1"/></transform>"#,
+        )
+        .unwrap();
+        let probes: [Probe; 4] = [
+            (
+                [0.8, 0.3],
+                [0.2, 0.9],
+                [1.038_239, 1.804_338, 3.149_943],
+                [0.624_752, -0.612_211, -0.484_648],
+                50.626_98,
+            ),
+            (
+                [0.8, 0.3],
+                [0.7, 0.4],
+                [1.073_896, 2.068_192, 2.939_575],
+                [0.596_046, -0.701_58, -0.390_532],
+                51.845_52,
+            ),
+            (
+                [0.1, 0.6],
+                [0.2, 0.9],
+                [1.050_168, 1.827_006, 3.145_169],
+                [0.819_326, -0.157_089, -0.551_387],
+                53.149_105,
+            ),
+            (
+                [0.5, 0.5],
+                [0.5, 0.5],
+                [1.036_38, 1.975_746, 2.975_746],
+                [0.727_607, -0.485_071, -0.485_071],
+                49.95,
+            ),
+        ];
+        for (film, lens, origin, direction, length) in probes {
+            let ray = camera.ray(Vec2::from(film), Vec2::from(lens), 0.0);
+            assert!(ray.origin.distance(Vec3::from(origin)) < 2e-6, "{ray:?}");
+            assert!(
+                ray.direction.distance(Vec3::from(direction)) < 2e-6,
+                "{ray:?}"
+            );
+            assert!((ray.t_max - length).abs() < 1e-4, "{ray:?}");
+        }
+    }
+
+    #[test]
+    fn every_aperture_is_covered_evenly_and_its_cells_stay_whole() {
+        for blades in [0, 3, 5, 6, 17] {
+            let camera = camera(&format!(
+                r#"<float name="aperture_radius" value="2"/><float name="aperture_rotation" value="20"/>
+                <integer name="aperture_blades" value="{blades}"/>"#
+            ))
+            .unwrap();
+            let expected_area = match blades {
+                0 => 4.0 * std::f64::consts::PI,
+                n => {
+                    let n = f64::from(n);
+                    2.0 * n * (std::f64::consts::TAU / n).sin()
+                }
+            };
+            // The area of each cell's image is the same share of the whole.
+            let side = 96;
+            let at = |x: i32, y: i32| {
+                let u = Vec2::new(x as f32, y as f32) / side as f32;
+                camera.aperture.point(u).as_dvec2()
+            };
+            let mut total = 0.0;
+            let share = expected_area / f64::from(side * side);
+            for (x, y) in (0..side).flat_map(|y| (0..side).map(move |x| (x, y))) {
+                let [a, b, c, d] = [at(x, y), at(x + 1, y), at(x + 1, y + 1), at(x, y + 1)];
+                let area = 0.5 * (c - a).perp_dot(d - b).abs();
+                assert!(
+                    area < 1.6 * share,
+                    "{blades} blades: {area} {share} {x} {y}"
+                );
+                assert!(a.length() <= 2.0 + 1e-6);
+                total += area;
+            }
+            assert!(
+                (total / expected_area - 1.0).abs() < 5e-3,
+                "{blades} blades: {total}, {expected_area}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_polygon_has_a_corner_on_top_until_it_is_turned() {
+        let corner = |rotation: f64| {
+            let camera = camera(&format!(
+                r#"<float name="aperture_radius" value="1"/><integer name="aperture_blades" value="4"/>
+                <float name="aperture_rotation" value="{rotation}"/>"#
+            ));
+            camera.unwrap().aperture.corners[0]
+        };
+        assert!(corner(0.0).distance(Vec2::Y) < 1e-6);
+        // The image's right.
+        assert!(corner(90.0).distance(Vec2::NEG_X) < 1e-6);
+    }
+
+    #[test]
+    fn a_lens_without_an_opening_is_a_pinhole_and_one_that_cannot_be_is_refused() {
+        let film = Vec2::new(0.3, 0.8);
+        let pinhole = camera(r#"<float name="aperture_radius" value="0"/>"#).unwrap();
+        let ray = pinhole.ray(film, Vec2::new(0.1, 0.9), 0.0);
+        assert_eq!(ray, pinhole.pinhole.ray(film, Vec2::ZERO, 0.0));
+        let radius = r#"<float name="aperture_radius" value="0.1"/>"#;
+        for (inside, message) in [
+            ("", "needs an aperture_radius"),
+            (r#"<float name="aperture_radius" value="-1"/>"#, "negative"),
+            (
+                &format!(r#"{radius}<float name="focus_distance" value="0"/>"#),
+                "must be positive",
+            ),
+            (
+                &format!(r#"{radius}<integer name="aperture_blades" value="2"/>"#),
+                "2 blades",
+            ),
+        ] {
+            let error = camera(inside).unwrap_err().to_string();
+            assert!(error.contains(message), "{inside}: {error}");
+        }
+    }
+}
