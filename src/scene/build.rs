@@ -114,6 +114,18 @@ impl<C: ColorModel> Builder<'_, C> {
                     .push(error.at(emitter.location()).help("only \"area\" can"));
                 None
             }
+            Some(emitter) if geometry.area().is_infinite() => {
+                let error = Error::input(format!(
+                    "a {} has no end, and cannot be a light",
+                    properties.plugin()
+                ));
+                self.problems.push(
+                    error
+                        .at(emitter.location())
+                        .help("let a large rectangle emit"),
+                );
+                None
+            }
             Some(emitter) => self.light(emitter, Some(geometry)),
             None => None,
         };

@@ -4,6 +4,7 @@
 mod cylinder;
 mod disk;
 mod mesh;
+mod plane;
 mod sphere;
 
 mod cube;
@@ -14,18 +15,19 @@ mod rectangle;
 mod serialized;
 mod stl;
 
-use glam::{DMat4, Vec2, Vec3};
+use glam::{DAffine3, DMat3, DMat4, DVec3, Vec2, Vec3};
 
 use crate::description::{Kind, Properties};
 use crate::error::{Problem, Result};
 use crate::family;
 use crate::interaction::{Hit, Interaction, Ray};
-use crate::math::Transform;
+use crate::math::{Transform, offset};
 use crate::mesh::Mesh;
 
 pub use cylinder::Cylinder;
 pub use disk::Disk;
 pub use mesh::TriangleMesh;
+pub use plane::Plane;
 pub use sphere::Sphere;
 
 /// An axis-aligned box.
@@ -42,6 +44,12 @@ impl Bounds {
     pub const EMPTY: Self = Self {
         min: Vec3::INFINITY,
         max: Vec3::NEG_INFINITY,
+    };
+
+    /// Contains every point.
+    pub const EVERYTHING: Self = Self {
+        min: Vec3::NEG_INFINITY,
+        max: Vec3::INFINITY,
     };
 
     /// The smallest box around both.
@@ -84,6 +92,12 @@ impl Bounds {
     pub fn is_empty(&self) -> bool {
         !self.min.cmple(self.max).all()
     }
+
+    /// Whether it contains something and has no end.
+    pub fn is_unbounded(&self) -> bool {
+        let has_end = self.min.is_finite() && self.max.is_finite();
+        !(has_end || self.is_empty())
+    }
 }
 
 /// A point drawn on a surface as seen from another point.
@@ -108,13 +122,13 @@ pub struct SurfaceSample {
 pub trait Surface: std::fmt::Debug + Send + Sync {
     /// How many primitives it has.
     fn primitive_count(&self) -> u32;
-    /// A box that contains a primitive's every hit.
+    /// A box that contains a primitive's every hit; it may be without an end.
     fn bounds(&self, primitive: u32) -> Bounds;
     /// (t, u, v) of a primitive's first hit with 0 < t ≤ `t_max`.
     fn intersect(&self, primitive: u32, ray: &Ray) -> Option<(f32, f32, f32)>;
     /// What a hit looks like; `hit` came from this surface and `ray`.
     fn interaction(&self, ray: &Ray, hit: &Hit) -> Interaction<'_>;
-    /// In square units of the scene.
+    /// In square units of the scene; may be infinite.
     fn area(&self) -> f64;
     /// A point drawn on the surface for light at `from`; `None` where none can be.
     fn sample(&self, from: Vec3, u: Vec2) -> Option<SurfaceSample>;
@@ -134,6 +148,8 @@ pub enum Geometry {
     Cylinder(Cylinder),
     /// A disk.
     Disk(Disk),
+    /// A plane without an end.
+    Plane(Plane),
     /// A sphere.
     Sphere(Sphere),
 }
@@ -156,6 +172,7 @@ impl std::ops::Deref for Geometry {
             Self::Mesh(mesh) => mesh,
             Self::Cylinder(cylinder) => cylinder,
             Self::Disk(disk) => disk,
+            Self::Plane(plane) => plane,
             Self::Sphere(sphere) => sphere,
         }
     }
@@ -188,6 +205,7 @@ const PLUGINS: &[(&str, Build)] = &[
     ("disk", disk::build),
     ("gltf", gltf::build),
     ("obj", obj::build),
+    ("plane", plane::build),
     ("ply", ply::build),
     ("rectangle", rectangle::build),
     ("serialized", serialized::build),
@@ -227,6 +245,18 @@ pub fn build(properties: &Properties<'_>) -> Result<Shape> {
 /// The property `to_world`, the identity by default.
 fn to_world(properties: &Properties<'_>) -> Result<DMat4> {
     Ok(properties.transform("to_world")?.unwrap_or(DMat4::IDENTITY))
+}
+
+/// A bound, for each axis, on the error of a world position that was computed in double precision from the
+/// `local` one and then rounded: half a unit in the last place, and what the transforms there and back can have lost,
+/// which is all that is left where `position` is near 0.
+fn rounding(to_world: &DAffine3, local: DVec3, position: DVec3) -> Vec3 {
+    // Some thousand roundings of double precision; those of single precision are 10⁴ times larger.
+    const DOUBLE: f64 = 1e3 * f64::EPSILON;
+    let m = to_world.matrix3;
+    let spread = DMat3::from_cols(m.x_axis.abs(), m.y_axis.abs(), m.z_axis.abs());
+    let reach = spread * local.abs() + to_world.translation.abs();
+    (position.abs() * f64::from(offset::gamma(2)) + reach * DOUBLE).as_vec3()
 }
 
 /// Density per solid angle of a point drawn with density 1/`area` over a surface.
