@@ -13,9 +13,11 @@ mod cylinder;
 mod gltf;
 mod obj;
 mod ply;
+mod polygon;
 mod rectangle;
 mod serialized;
 mod stl;
+mod triangle;
 
 use glam::{DAffine3, DMat3, DMat4, DVec3, Vec2, Vec3};
 
@@ -211,10 +213,12 @@ const PLUGINS: &[(&str, Build)] = &[
     ("obj", obj::build),
     ("plane", plane::build),
     ("ply", ply::build),
+    ("polygon", polygon::build),
     ("rectangle", rectangle::build),
     ("serialized", serialized::build),
     ("sphere", sphere::build),
     ("stl", stl::build),
+    ("triangle", triangle::build),
 ];
 
 /// Shapes made of shapes, which the scene puts together: several in a space of their own, and those once
@@ -222,11 +226,13 @@ const PLUGINS: &[(&str, Build)] = &[
 pub const GROUP: &str = "shapegroup";
 /// See [`GROUP`].
 pub const INSTANCE: &str = "instance";
+/// A node of a scene graph: shapes that share its transform and its material.
+pub const NODE: &str = "group";
 
 /// The names of the plugins, as scene files write them.
 pub fn names() -> Vec<&'static str> {
     let single = PLUGINS.iter().map(|(name, _)| *name);
-    single.chain([GROUP, INSTANCE]).collect()
+    single.chain([GROUP, INSTANCE, NODE]).collect()
 }
 
 /// Builds the shape that `properties` names.
