@@ -37,16 +37,16 @@ HEAD = """\
         </film>
     </sensor>
 
-    <emitter type="constant"><rgb name="radiance" value="0.06, 0.09, 0.13"/></emitter>
+    <emitter type="constant"><rgb name="radiance" value="0.022, 0.034, 0.055"/></emitter>
     <shape type="sphere">
         <point name="center" value="-5, 6, 7"/>
         <float name="radius" value="1.6"/>
-        <emitter type="area"><rgb name="radiance" value="15, 14, 12"/></emitter>
+        <emitter type="area"><rgb name="radiance" value="27, 25, 21"/></emitter>
     </shape>
     <shape type="sphere">
         <point name="center" value="7, -2, -5"/>
         <float name="radius" value="2"/>
-        <emitter type="area"><rgb name="radiance" value="5, 7, 10"/></emitter>
+        <emitter type="area"><rgb name="radiance" value="9, 13, 19"/></emitter>
     </shape>
 
     <bsdf type="plastic" id="skin"><rgb name="diffuse_reflectance" value="0.42, 0.43, 0.50"/></bsdf>
@@ -59,7 +59,7 @@ HEAD = """\
         <shape type="cone">
             <ref id="stalk"/>
             <point name="p0" value="0, 0, -0.05"/>
-            <point name="p1" value="0, 0, 0.5"/>
+            <point name="p1" value="0, 0, 0.36"/>
             <float name="radius" value="0.055"/>
             <boolean name="base" value="false"/>
         </shape>
@@ -96,7 +96,7 @@ TAIL = """\
         <transform name="to_world">
             <rotate z="1" angle="70"/>
             <scale value="0.42"/>
-            <translate x="2.35" y="0.95" z="-0.6"/>
+            <translate x="2.05" y="1.0" z="-1.2"/>
         </transform>
         <ref id="virus"/>
     </shape>
@@ -104,7 +104,7 @@ TAIL = """\
         <transform name="to_world">
             <rotate y="1" angle="130"/>
             <scale value="0.5"/>
-            <translate x="-3.3" y="-1.5" z="-3.2"/>
+            <translate x="-2.45" y="-1.2" z="-3.2"/>
         </transform>
         <ref id="virus"/>
     </shape>
