@@ -12,7 +12,7 @@ use crate::description::{Description, Kind, NodeId, Properties, Value};
 use crate::error::{Error, Problems, Result};
 use crate::light::{Light, LightContext};
 use crate::material::Material;
-use crate::shape::Geometry;
+use crate::shape::{self, Geometry};
 use crate::texture::Palettes;
 
 /// What is made while a scene is built.
@@ -23,6 +23,7 @@ struct Builder<'d, C: ColorModel> {
     /// The materials that were made already, by node.
     known: HashMap<NodeId, MaterialId>,
     lights: Vec<Light<C>>,
+    ambients: Vec<Light<C>>,
     problems: Problems,
 }
 
@@ -44,6 +45,7 @@ impl<C: ColorModel> Builder<'_, C> {
         Some(id)
     }
 
+    /// Adds a light, and says where it is if it is somewhere.
     fn light(
         &mut self,
         properties: &Properties<'_>,
@@ -54,6 +56,10 @@ impl<C: ColorModel> Builder<'_, C> {
             shape,
         };
         let light = self.problems.take(Light::build(properties, &context))?;
+        if light.is_ambient() {
+            self.ambients.push(light);
+            return None;
+        }
         self.lights.push(light);
         Some(LightId(self.lights.len() as u32 - 1))
     }
@@ -146,6 +152,30 @@ pub fn check_materials<C: ColorModel>(description: &Description, color: C) -> Re
     problems.finish()
 }
 
+/// The names of a scene's [`Scene::lights`] in their order: a light's id, or its shape's, or its number.
+pub fn light_names(description: &Description) -> Vec<String> {
+    let root = description.root();
+    let mut names = Vec::new();
+    let mut add = |light: &Properties<'_>, shape: Option<&Properties<'_>>| {
+        let id = light.id().or_else(|| shape?.id());
+        names.push(id.map_or_else(|| names.len().to_string(), str::to_owned));
+    };
+    for shape in root.children(Kind::Shape) {
+        // Groups and their instances give no light.
+        if ![shape::GROUP, shape::INSTANCE].contains(&shape.plugin()) {
+            for light in shape.children(Kind::Emitter) {
+                add(&light, Some(&shape));
+            }
+        }
+    }
+    for light in root.children(Kind::Emitter) {
+        if light.plugin() != "ambient" {
+            add(&light, None);
+        }
+    }
+    names
+}
+
 /// Builds the scene that `description` holds, with its geometry loaded.
 pub fn build<C: ColorModel>(
     description: &Description,
@@ -159,6 +189,7 @@ pub fn build<C: ColorModel>(
         materials: Vec::new(),
         known: HashMap::new(),
         lights: Vec::new(),
+        ambients: Vec::new(),
         problems: Problems::default(),
     };
     let root = description.root();
@@ -186,7 +217,10 @@ pub fn build<C: ColorModel>(
     }
     builder.problems.finish()?;
     let Builder {
-        materials, lights, ..
+        materials,
+        lights,
+        ambients,
+        ..
     } = builder;
     let tracer = Tracer::new(
         assets.shapes.iter().map(|s| s.geometry.clone()).collect(),
@@ -199,6 +233,7 @@ pub fn build<C: ColorModel>(
         tracer,
         materials,
         lights,
+        ambients,
         environment: environment.map(|(id, _)| id),
         surfacing,
     })

@@ -13,7 +13,7 @@ use crate::light::{Light, LightSample};
 use crate::material::Material;
 
 pub use assets::Assets;
-pub use build::{build, check_materials};
+pub use build::{build, check_materials, light_names};
 
 /// A material's place in its scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -22,6 +22,13 @@ pub struct MaterialId(u32);
 /// A light's place in its scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct LightId(u32);
+
+impl LightId {
+    /// The light's place among [`Scene::lights`].
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+}
 
 /// What a shape is made of.
 #[derive(Clone, Copy, Debug)]
@@ -37,6 +44,8 @@ pub struct Scene<C: ColorModel> {
     tracer: Tracer,
     materials: Vec<Material<C>>,
     lights: Vec<Light<C>>,
+    /// Never chosen, for they are nowhere.
+    ambients: Vec<Light<C>>,
     environment: Option<LightId>,
     /// By shape.
     surfacing: Vec<Surfacing>,
@@ -55,7 +64,22 @@ impl<C: ColorModel> Scene<C> {
 
     /// How many lights there are.
     pub fn light_count(&self) -> usize {
-        self.lights.len()
+        self.lights.len() + self.ambients.len()
+    }
+
+    /// The lights that are somewhere, as [`light_names`] names them.
+    pub fn lights(&self) -> &[Light<C>] {
+        &self.lights
+    }
+
+    /// The light all around, if there is one.
+    pub fn environment(&self) -> Option<LightId> {
+        self.environment
+    }
+
+    /// The light that the surface at a point is.
+    pub fn light_at(&self, at: &Interaction<'_>) -> Option<LightId> {
+        self.surfacing[at.shape as usize].light
     }
 
     /// Whether there is light all around.
@@ -86,13 +110,6 @@ impl<C: ColorModel> Scene<C> {
     /// The material at a point.
     pub fn material(&self, at: &Interaction<'_>) -> &Material<C> {
         &self.materials[self.surfacing[at.shape as usize].material.0 as usize]
-    }
-
-    /// The light that a point belongs to.
-    fn light_at(&self, at: &Interaction<'_>) -> Option<&Light<C>> {
-        self.surfacing[at.shape as usize]
-            .light
-            .map(|id| self.light(id))
     }
 
     fn light(&self, id: LightId) -> &Light<C> {
@@ -132,7 +149,7 @@ impl<C: ColorModel> Scene<C> {
         from: Vec3,
         w: &C::Wavelengths,
     ) -> Option<(C::Sample, f32)> {
-        let light = self.light_at(at)?;
+        let light = self.light(self.light_at(at)?);
         let radiance = light.surface_radiance(at, w);
         (!radiance.is_black()).then(|| (radiance, light.surface_pdf(from, at) * self.choice()))
     }
@@ -142,5 +159,12 @@ impl<C: ColorModel> Scene<C> {
         let light = self.light(self.environment?);
         let radiance = light.environment_radiance(direction, w);
         (!radiance.is_black()).then(|| (radiance, light.environment_pdf(direction) * self.choice()))
+    }
+
+    /// What the surface at `at` returns of ambient light toward `at.wi`; `None` in a scene without any.
+    pub fn ambient(&self, at: &Interaction<'_>, w: &C::Wavelengths) -> Option<C::Sample> {
+        let brought = self.ambients.iter().map(|light| light.ambient_radiance(w));
+        let radiance = brought.reduce(|a, b| a + b)?;
+        Some(radiance * self.material(at).ambient(at, at.wi, w))
     }
 }

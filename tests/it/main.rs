@@ -10,5 +10,6 @@ mod golden;
 mod inputs;
 mod layers;
 mod mitsuba_data;
+mod phong;
 mod resume;
 mod same_bits;
