@@ -12,7 +12,7 @@ use crate::description::{Description, Kind, NodeId, Properties, Value};
 use crate::error::{Error, Problems, Result};
 use crate::light::{Light, LightContext};
 use crate::material::Material;
-use crate::shape::{self, Geometry};
+use crate::shape::Geometry;
 use crate::texture::Palettes;
 
 /// What is made while a scene is built.
@@ -160,16 +160,13 @@ pub fn light_names(description: &Description) -> Vec<String> {
         let id = light.id().or_else(|| shape?.id());
         names.push(id.map_or_else(|| names.len().to_string(), str::to_owned));
     };
-    for shape in root.children(Kind::Shape) {
-        // Groups and their instances give no light.
-        if ![shape::GROUP, shape::INSTANCE].contains(&shape.plugin()) {
-            for light in shape.children(Kind::Emitter) {
-                add(&light, Some(&shape));
-            }
+    for shape in root.peek_children(Kind::Shape) {
+        for light in shape.peek_children(Kind::Emitter) {
+            add(&light, Some(&shape));
         }
     }
-    for light in root.children(Kind::Emitter) {
-        if light.plugin() != "ambient" {
+    for light in root.peek_children(Kind::Emitter) {
+        if light.peek_plugin() != "ambient" {
             add(&light, None);
         }
     }

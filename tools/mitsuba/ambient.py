@@ -17,7 +17,7 @@ class Ambient(mi.Emitter):
     def __init__(self, props):
         mi.Emitter.__init__(self, props)
         self.radiance = props.get_emissive_texture('radiance', 1.0)
-        self.m_flags = mi.UInt32(0) if False else 0
+        self.m_flags = +mi.EmitterFlags.Empty
 
     def eval(self, si, active=True):
         """What it brings to a point: only the integrator `phong` asks."""

@@ -9,7 +9,9 @@ light and follows mirrors and clear boundaries, one ray at a time. It needs an `
 Mitsuba 3.9 cannot run integrators written in Python in `scalar_*`. Properties: `falloff` (`none`,
 `inverse_square`), `shadows`, `max_depth`, `rr_depth`, `hide_emitters`; `layers` is read and does nothing.
 
-Set the variant, then import this file: it registers both.
+Set the variant, then import this file: it registers both. Mitsuba keeps plugins of all kinds under one set of
+names. So `phong` makes the integrator where it has one of the properties above, and the BSDF otherwise; an
+integrator without any must give one (`falloff` `none`) or be called `phong_integrator`.
 """
 import drjit as dr
 import mitsuba as mi
@@ -17,6 +19,7 @@ import mitsuba as mi
 # A bit of BSDFContext.type_mask that Mitsuba's own BSDFs do not know: asks for the textbook's terms over π.
 TEXTBOOK = 1 << 30
 STEPS = 16
+INTEGRATOR = {'falloff', 'shadows', 'max_depth', 'rr_depth', 'hide_emitters', 'layers'}
 
 
 def over_surface(*textures):
@@ -42,7 +45,7 @@ class Phong(mi.BSDF):
         self.ambient = props.get_texture('ambient_reflectance', 0.0)
         self.diffuse = props.get_texture('diffuse_reflectance', 0.5)
         self.specular = props.get_texture('specular_reflectance', 0.2)
-        self.exponent = props.get_texture('exponent', 30.0)
+        self.exponent = props.get_unbounded_texture('exponent', 30.0)
         largest = max(number(dr.max(v)) for v in over_surface(self.diffuse, self.specular))
         self.scale = 0.99 / largest if largest > 1 else 1.0
         diffuse, specular = (sum(number(dr.mean(v)) for v in over_surface(t)) for t in (self.diffuse, self.specular))
@@ -160,9 +163,9 @@ class PhongIntegrator(mi.SamplingIntegrator):
             si = scene.ray_intersect(ray, active)
             bsdf = si.bsdf(ray)
             emitter = si.emitter(scene, active)
-            shown = active & ((depth > 0) | (not self.hide_emitters()))
+            shown = active & ((depth > 0) | (not self.hide_emitters))
             result += throughput * emitter.eval(si, shown)
-            valid |= (depth == 0) & (si.is_valid() | ((not self.hide_emitters()) & (emitter != None)))
+            valid |= (depth == 0) & (si.is_valid() | ((not self.hide_emitters) & (emitter != None)))
             active &= si.is_valid()
             if dr.hint(len(ambients) > 0, mode='scalar'):
                 k = bsdf.eval_attribute_3('ambient_reflectance', si, active)
@@ -187,5 +190,10 @@ class PhongIntegrator(mi.SamplingIntegrator):
         return f'PhongIntegrator[inverse_square={self.inverse_square}, shadows={self.shadows}]'
 
 
-mi.register_bsdf('phong', Phong)
-mi.register_integrator('phong', PhongIntegrator)
+def phong(props):
+    """The integrator where a property is one of an integrator's, else the BSDF."""
+    return PhongIntegrator(props) if INTEGRATOR.intersection(props.keys()) else Phong(props)
+
+
+mi.register_bsdf('phong', phong)
+mi.register_integrator('phong_integrator', PhongIntegrator)
