@@ -102,7 +102,8 @@ pub trait Estimator<C: ColorModel>: std::fmt::Debug + Send + Sync {
 /// What integrators are built with.
 #[derive(Clone, Debug, Default)]
 pub struct Context {
-    /// The names of the scene's lights in their order, as [`crate::scene::light_names`] gives them.
+    /// The names of the scene's lights in their order, as [`crate::scene::light_names`] gives them; the
+    /// integrator then serves scenes with these lights.
     pub lights: Vec<String>,
 }
 

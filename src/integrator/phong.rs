@@ -11,6 +11,7 @@
 //! `layers` takes the image apart, see [`super::layers`].
 
 use super::layers::{Layers, Term};
+use super::path::Limits;
 use super::{Context, Estimate, Estimates, Estimator, FIRST_DIMENSION, Start, Stats};
 use crate::color::{ColorModel, Spectral};
 use crate::description::Properties;
@@ -19,8 +20,6 @@ use crate::interaction::{Hit, Interaction, Ray};
 use crate::light::LightSample;
 use crate::sampler::{Sampler, Stream};
 use crate::scene::Scene;
-
-use super::path::Limits;
 
 /// The settings.
 #[derive(Clone, Debug)]
