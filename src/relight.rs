@@ -226,7 +226,7 @@ mod tests {
         for (of, message) in [
             (("difuse", [1.0; 3]), "did you mean \"diffuse\"?"),
             (("ligh", [1.0; 3]), "did you mean \"light\"?"),
-            (("", [1.0; 3]), "there are ambient, light.a.diffuse"),
+            (("velvet", [1.0; 3]), "there are ambient, light.a.diffuse"),
             (("a", [1.0, -1.0, 1.0]), "must be finite and not negative"),
             (("a", [f32::NAN; 3]), "must be finite and not negative"),
         ] {
