@@ -17,6 +17,7 @@ pub mod interaction;
 
 pub mod display;
 pub mod filter;
+pub mod relight;
 pub mod sampler;
 pub mod shape;
 pub mod texture;

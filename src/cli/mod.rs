@@ -6,6 +6,7 @@
 
 mod check;
 mod info;
+mod relight;
 mod render;
 
 mod batch;
@@ -38,6 +39,7 @@ enum Command {
     Render(Box<render::Arguments>),
     Check(check::Arguments),
     Info(info::Arguments),
+    Relight(relight::Arguments),
 }
 
 /// Runs the command that the arguments name.
@@ -46,6 +48,7 @@ pub(crate) fn run() -> ExitCode {
         Command::Render(arguments) => render::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
+        Command::Relight(arguments) => relight::run(&arguments),
     };
     match result {
         Ok(status) => ExitCode::from(status),

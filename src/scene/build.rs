@@ -24,6 +24,7 @@ struct Builder<'d, C: ColorModel> {
     /// The materials that were made already, by node.
     known: HashMap<NodeId, MaterialId>,
     lights: Vec<Light<C>>,
+    ambients: Vec<Light<C>>,
     problems: Problems,
 }
 
@@ -45,6 +46,7 @@ impl<C: ColorModel> Builder<'_, C> {
         Some(id)
     }
 
+    /// Adds a light, and says where it is if it is somewhere.
     fn light(
         &mut self,
         properties: &Properties<'_>,
@@ -55,6 +57,10 @@ impl<C: ColorModel> Builder<'_, C> {
             shape,
         };
         let light = self.problems.take(Light::build(properties, &context))?;
+        if light.is_ambient() {
+            self.ambients.push(light);
+            return None;
+        }
         self.lights.push(light);
         Some(LightId(self.lights.len() as u32 - 1))
     }
@@ -161,6 +167,27 @@ pub fn check_materials<C: ColorModel>(description: &Description, color: C) -> Re
     problems.finish()
 }
 
+/// The names of a scene's [`Scene::lights`] in their order: a light's id, or its shape's, or its number.
+pub fn light_names(description: &Description) -> Vec<String> {
+    let root = description.root();
+    let mut names = Vec::new();
+    let mut add = |light: &Properties<'_>, shape: Option<&Properties<'_>>| {
+        let id = light.id().or_else(|| shape?.id());
+        names.push(id.map_or_else(|| names.len().to_string(), str::to_owned));
+    };
+    for shape in root.peek_children(Kind::Shape) {
+        for light in shape.peek_children(Kind::Emitter) {
+            add(&light, Some(&shape));
+        }
+    }
+    for light in root.peek_children(Kind::Emitter) {
+        if light.peek_plugin() != "ambient" {
+            add(&light, None);
+        }
+    }
+    names
+}
+
 /// Builds the scene that `description` holds, with its geometry loaded.
 pub fn build<C: ColorModel>(
     description: &Description,
@@ -174,6 +201,7 @@ pub fn build<C: ColorModel>(
         materials: Vec::new(),
         known: HashMap::new(),
         lights: Vec::new(),
+        ambients: Vec::new(),
         problems: Problems::default(),
     };
     let root = description.root();
@@ -201,7 +229,10 @@ pub fn build<C: ColorModel>(
     }
     builder.problems.finish()?;
     let Builder {
-        materials, lights, ..
+        materials,
+        lights,
+        ambients,
+        ..
     } = builder;
     let tracer = Tracer::new(
         assets.shapes.iter().map(|s| s.geometry.clone()).collect(),
@@ -216,6 +247,7 @@ pub fn build<C: ColorModel>(
         materials,
         lights,
         choice,
+        ambients,
         environment: environment.map(|(id, _)| id),
         surfacing,
     })

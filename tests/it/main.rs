@@ -11,5 +11,6 @@ mod inputs;
 mod layers;
 mod lights;
 mod mitsuba_data;
+mod phong;
 mod resume;
 mod same_bits;
