@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::image::{Codes, Layout};
 
 /// Pixels are enlarged until the picture is so wide.
-const LEAST_WIDTH: usize = 384;
+const LEAST_WIDTH: usize = 416;
 /// A letter's side.
 const LETTER: usize = 8;
 const BACKGROUND: [u8; 3] = [24, 24, 24];
@@ -203,14 +203,14 @@ mod tests {
             let first = (y * codes.width() + x) as usize * 3;
             [0, 1, 2].map(|c| codes.data()[first + c])
         };
-        assert_eq!(codes.width(), 384);
-        assert_eq!(codes.height(), 384 + 40);
+        assert_eq!(codes.width(), 416);
+        assert_eq!(codes.height(), 416 + 40);
         assert_eq!(pixel(0, 0), color(0.0));
-        assert_eq!(pixel(383, 191), color(0.5));
-        assert_eq!(pixel(0, 383), color(1.0));
-        assert_eq!(pixel(383, 383), color(1.0));
-        assert_eq!(pixel(4, 384 + 18), color(0.0));
-        assert_eq!(pixel(379, 384 + 18), color(1.0));
+        assert_eq!(pixel(415, 207), color(0.5));
+        assert_eq!(pixel(0, 415), color(1.0));
+        assert_eq!(pixel(415, 415), color(1.0));
+        assert_eq!(pixel(4, 416 + 18), color(0.0));
+        assert_eq!(pixel(411, 416 + 18), color(1.0));
         let ink = codes.data().chunks(3).filter(|p| **p == INK).count();
         assert!(ink > 300, "{ink} dots of text");
         assert!(Map { width: 3, ..map }.draw().is_err());
