@@ -15,6 +15,7 @@ pub mod mesh;
 pub(crate) mod family;
 pub mod interaction;
 
+pub mod compare;
 pub mod display;
 pub mod filter;
 pub mod relight;

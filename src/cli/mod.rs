@@ -2,9 +2,11 @@
 //!
 //! Exit status: 0 done; 1 the input is wrong or asks for what Étendue lacks; 2 the command line is wrong;
 //! 3 the system refused (a file that cannot be read or written); 130 stopped by a signal, after writing
-//! what was complete. Of several images the gravest counts.
+//! what was complete. Of several images the gravest counts. `compare` answers with 0 agree, 1 differ,
+//! 2 cannot compare.
 
 mod check;
+mod compare;
 mod info;
 mod relight;
 mod render;
@@ -38,6 +40,7 @@ struct Arguments {
 enum Command {
     Render(Box<render::Arguments>),
     Check(check::Arguments),
+    Compare(Box<compare::Arguments>),
     Info(info::Arguments),
     Relight(relight::Arguments),
 }
@@ -47,6 +50,7 @@ pub(crate) fn run() -> ExitCode {
     let result = match Arguments::parse().command {
         Command::Render(arguments) => render::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
+        Command::Compare(arguments) => compare::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
         Command::Relight(arguments) => relight::run(&arguments),
     };

@@ -13,7 +13,7 @@ const LAYERS: &[&[&str]] = &[
     &["description", "image", "mesh"],
     &["family", "interaction"],
     &[
-        "display", "filter", "relight", "sampler", "shape", "texture",
+        "compare", "display", "filter", "relight", "sampler", "shape", "texture",
     ],
     &["sensor"],
     &["accel", "light", "material"],
