@@ -5,6 +5,7 @@
 //! what was complete. Of several images the gravest counts.
 
 mod check;
+mod crosscheck;
 mod info;
 mod render;
 
@@ -19,6 +20,7 @@ mod status;
 mod stop;
 mod summary;
 mod turntable;
+mod verdicts;
 
 use std::process::ExitCode;
 
@@ -38,7 +40,14 @@ enum Command {
     Render(Box<render::Arguments>),
     Check(check::Arguments),
     Info(info::Arguments),
+    Crosscheck(Box<crosscheck::Arguments>),
+    /// Étendue's side of a crosscheck, which starts it: answers orders on standard input
+    #[command(hide = true)]
+    CrosscheckWorker,
 }
+
+/// The name of the hidden command that serves [`Command::Crosscheck`].
+const CROSSCHECK_WORKER: &str = "crosscheck-worker";
 
 /// Runs the command that the arguments name.
 pub(crate) fn run() -> ExitCode {
@@ -46,6 +55,8 @@ pub(crate) fn run() -> ExitCode {
         Command::Render(arguments) => render::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
+        Command::Crosscheck(arguments) => crosscheck::run(&arguments),
+        Command::CrosscheckWorker => crosscheck::serve(),
     };
     match result {
         Ok(status) => ExitCode::from(status),

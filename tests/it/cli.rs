@@ -105,6 +105,7 @@ fn help_reads_as_it_was_blessed() {
         ("render", &["render", "--help"]),
         ("check", &["check", "--help"]),
         ("info", &["info", "--help"]),
+        ("crosscheck", &["crosscheck", "--help"]),
     ] {
         let output = Command::new(env!("CARGO_BIN_EXE_etendue"))
             .args(arguments)
