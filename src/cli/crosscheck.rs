@@ -72,10 +72,10 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "SECONDS", default_value = "300", value_parser = parse::seconds)]
     timeout: Duration,
 
-    /// Too noisy to say where the images agree and the interval around the bias is wider than ± this part
-    /// of the mean, such as 0.005
-    #[arg(long, value_name = "PART", value_parser = parse::part)]
-    precision: Option<f64>,
+    /// Where the images agree and the interval around the bias is wider than ± this part of the mean, they
+    /// are too noisy to say
+    #[arg(long, value_name = "PART", default_value = "0.05", value_parser = parse::part)]
+    precision: f64,
     /// Do not judge the images, compare the times
     #[arg(long)]
     timing_only: bool,
@@ -153,7 +153,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         Ok(settings) => settings,
         Err(error) => {
             report::error(&error);
-            return Ok(status::USAGE);
+            return Ok(status::CANNOT_COMPARE);
         }
     };
     let style = Style {

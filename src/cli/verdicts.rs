@@ -13,7 +13,7 @@ pub(super) struct Style {
     pub(super) quiet: bool,
     pub(super) json: bool,
     /// The widest interval around the bias of images that agree, as a part of the mean.
-    pub(super) precision: Option<f64>,
+    pub(super) precision: f64,
 }
 
 /// What became of a scene.
@@ -35,7 +35,7 @@ enum Kind {
 }
 
 impl Kind {
-    fn of(result: &Result<Crosscheck, Failure>, precision: Option<f64>) -> Self {
+    fn of(result: &Result<Crosscheck, Failure>, precision: f64) -> Self {
         match result {
             Err(Failure::NotComparable(_)) => Self::NotComparable,
             Err(Failure::Stopped) => Self::Stopped,
@@ -44,11 +44,12 @@ impl Kind {
             Ok(Crosscheck {
                 verdict: Some(verdict),
                 ..
-            }) => match precision {
-                _ if !verdict.agrees => Self::Differ,
-                Some(precision) if verdict.means[0].half_width > precision => Self::TooNoisy,
-                _ => Self::Agree,
-            },
+            }) if !verdict.agrees => Self::Differ,
+            Ok(Crosscheck {
+                verdict: Some(verdict),
+                ..
+            }) if verdict.means[0].half_width > precision => Self::TooNoisy,
+            Ok(_) => Self::Agree,
         }
     }
 
@@ -272,14 +273,14 @@ fn row(scene: &str, ending: &Ending) -> [String; HEADS.len()] {
 pub(super) fn status(endings: &[(String, Ending)]) -> u8 {
     let has = |kinds: &[Kind]| endings.iter().any(|(_, e)| kinds.contains(&e.kind));
     if has(&[Kind::Differ]) {
-        status::INPUT
+        status::DIFFERS
     } else if has(&[
         Kind::TooNoisy,
         Kind::NotComparable,
         Kind::Failed,
         Kind::Stopped,
     ]) {
-        status::USAGE
+        status::CANNOT_COMPARE
     } else {
         status::DONE
     }

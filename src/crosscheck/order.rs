@@ -52,8 +52,6 @@ pub(super) struct Loaded {
     pub(super) renderer: String,
     /// Reading and building, without the program's own start.
     pub(super) time: Time,
-    /// Samples a pixel, as the sampler rounds them up.
-    pub(super) spp: u32,
     /// What was changed about the scene.
     pub(super) notes: Vec<String>,
 }
@@ -63,6 +61,8 @@ pub(super) struct Loaded {
 pub(super) struct Rendered {
     /// The file.
     pub(super) image: PathBuf,
+    /// Samples a pixel, as the sampler rounds them up.
+    pub(super) spp: u32,
     /// From the call to the pixels in memory.
     pub(super) time: Time,
 }

@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use super::cost::{self, Cost};
 use super::images::{self, Images};
-use super::order::{Loaded, Order, Reply};
+use super::order::{Order, Reply};
 use super::process::Worker;
 use super::{Failure, Settings, Side, Watch};
 use crate::compare::Layer;
@@ -105,7 +105,7 @@ pub fn crosscheck(
         images.keep(folder)?;
     }
     let notes = notes(&sides);
-    let spp = sides[0].loaded.spp;
+    let spp = sides[0].spp;
     let [etendue, mitsuba] = sides.map(Runner::finish);
     Ok(Crosscheck {
         verdict: (!settings.timing_only)
@@ -123,8 +123,8 @@ pub fn crosscheck(
 
 /// What was changed about the scene, and a difference that the scene does not have.
 fn notes(sides: &[Runner; 2]) -> Vec<String> {
-    let mut notes: Vec<String> = sides.iter().flat_map(|s| s.loaded.notes.clone()).collect();
-    let [ours, theirs] = [0, 1].map(|i| sides[i].loaded.spp);
+    let mut notes: Vec<String> = sides.iter().flat_map(|s| s.notes.clone()).collect();
+    let [ours, theirs] = [0, 1].map(|i| sides[i].spp);
     if ours != theirs {
         notes.push(format!(
             "Étendue takes {ours} samples a pixel and Mitsuba {theirs}"
@@ -138,7 +138,9 @@ fn notes(sides: &[Runner; 2]) -> Vec<String> {
 struct Runner {
     side: Side,
     worker: Worker,
-    loaded: Loaded,
+    notes: Vec<String>,
+    /// Samples a pixel; 0 before the first image.
+    spp: u32,
     cost: Cost,
 }
 
@@ -159,7 +161,7 @@ impl Runner {
             Reply::Rendered(_) => return Err(confused(side)),
         };
         let cost = Cost {
-            renderer: loaded.renderer.clone(),
+            renderer: loaded.renderer,
             start: begin.elapsed().as_secs_f64(),
             load: loaded.time,
             render: Vec::new(),
@@ -168,7 +170,8 @@ impl Runner {
         Ok(Self {
             side,
             worker,
-            loaded,
+            notes: loaded.notes,
+            spp: 0,
             cost,
         })
     }
@@ -184,6 +187,7 @@ impl Runner {
             return Err(confused(self.side));
         };
         self.cost.render.push(rendered.time);
+        self.spp = rendered.spp;
         let layer = images::read(&rendered.image)?;
         // Read once: a thousand seeds need not lie on the disk together.
         let _ = fs::remove_file(&rendered.image);

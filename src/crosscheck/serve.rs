@@ -83,11 +83,10 @@ impl Scene {
             ..Options::default()
         };
         let mut session = Session::default();
-        let info = session.info(&description, &options, &Silent)?;
+        session.bounds(&description, &options, &Silent)?;
         let loaded = Loaded {
             renderer: format!("Étendue {}", env!("CARGO_PKG_VERSION")),
             time: clock.time(),
-            spp: info.sensors.first().map_or(0, |sensor| sensor.spp),
             notes: Vec::new(),
         };
         let scene = Self {
@@ -109,6 +108,7 @@ impl Scene {
         let time = clock.time();
         let image = self.order.folder.join(format!("etendue-{seed}.exr"));
         display::save(&image, &rendered.image, &Metadata::default())?;
-        Ok(Rendered { image, time })
+        let spp = rendered.report.spp;
+        Ok(Rendered { image, spp, time })
     }
 }

@@ -87,10 +87,10 @@ class Parsed:
             if self.exists(node):
                 continue
             props, other = self.props(node), self.mi.Properties('independent')
+            self.notes.append(f'Mitsuba has no sampler "{props.plugin_name()}" and takes independent points')
             if 'sample_count' in props:
                 other['sample_count'] = props['sample_count']
             self.state.nodes[node].props = other
-            self.notes.append(f'Mitsuba has no sampler "{props.plugin_name()}" and takes independent points')
 
     def refuse_missing(self):
         """Raises `Refused` with every plugin that is not there."""
@@ -172,10 +172,10 @@ def main():
         scene, notes = load(mi, order)
     except Refused as error:
         return answer('refused', str(error))
-    sensor = scene.sensors()[0]
     answer('loaded', dict(renderer=f'Mitsuba {mi.__version__}, {order["variant"]}', time=clock.time(),
-                          spp=sensor.sampler().sample_count(), notes=notes))
-    film, integrator = sensor.film(), scene.integrator()
+                          notes=notes))
+    sensor, integrator = scene.sensors()[0], scene.integrator()
+    film, spp = sensor.film(), sensor.sampler().sample_count()
     for line in sys.stdin:
         seed = int(line)
         clock = Clock()
@@ -184,7 +184,7 @@ def main():
         taken = clock.time()
         path = str(Path(order['folder']) / f'mitsuba-{seed}.exr')
         bitmap.write(path)
-        answer('rendered', dict(image=path, time=taken))
+        answer('rendered', dict(image=path, spp=spp, time=taken))
 
 
 if __name__ == '__main__':

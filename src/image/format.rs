@@ -63,6 +63,9 @@ impl Decoder {
                 return Ok(decoder);
             }
         }
+        if bytes.is_empty() {
+            return Err(Error::input("the file is empty"));
+        }
         if extension(path) == "tga" {
             return Ok(Self::Raster(ImageFormat::Tga));
         }

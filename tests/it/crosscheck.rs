@@ -113,7 +113,7 @@ mod impostors {
     use super::*;
 
     const LOADED: &str =
-        r#"echo '{"loaded":{"renderer":"x","time":{"seconds":0,"cpu":0},"spp":64,"notes":[]}}'"#;
+        r#"echo '{"loaded":{"renderer":"x","time":{"seconds":0,"cpu":0},"notes":[]}}'"#;
 
     impl Place {
         /// A Python of the name `python` that does what `script` says, whatever it is given.
@@ -171,7 +171,7 @@ mod impostors {
         );
         let table = place.says(
             2,
-            "dim.xml missing.xml --python ./python --seeds 2 --spp 4 -q",
+            "dim.xml missing.xml --python ./python --seeds 2 --spp 4 --precision 9 -q",
         );
         assert!(
             table.contains("missing.xml: not comparable: Étendue refuses"),
@@ -300,7 +300,9 @@ fn mitsuba_agrees_and_what_it_lacks_is_named() {
     let run = |reference: &str, status| {
         place.says(
             status,
-            &format!("dim.xml --reference {reference}.xml {python} --seeds 2 --spp 1"),
+            &format!(
+                "dim.xml --reference {reference}.xml {python} --seeds 2 --spp 1 --precision 99"
+            ),
         )
     };
     let told = run("points", 0);

@@ -6,6 +6,7 @@ mod support;
 mod channels;
 mod cli;
 mod closed_form;
+mod compare;
 mod crosscheck;
 mod golden;
 mod inputs;
