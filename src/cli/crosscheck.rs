@@ -80,12 +80,12 @@ pub(super) struct Arguments {
     #[arg(long)]
     timing_only: bool,
     /// Keep both sides' mean images and a map of the error, in a folder of DIR for each scene
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", conflicts_with = "timing_only")]
     keep: Option<PathBuf>,
     /// Print a JSON object for each scene
     #[arg(long)]
     json: bool,
-    /// No progress, no word on scenes that agree
+    /// No progress bar, no paragraph on scenes that agree
     #[arg(short, long)]
     quiet: bool,
 }
@@ -119,6 +119,10 @@ impl Arguments {
         if bands.is_some() && !spectral(&variant) {
             let message = format!("--bands has no like in Mitsuba's variant {variant:?}");
             return Err(Error::input(message).help("take one such as scalar_spectral"));
+        }
+        if self.reference.is_some() && self.scenes.len() > 1 {
+            let message = "--reference is another form of one scene, and there are several";
+            return Err(Error::input(message));
         }
         let plugins = self.plugins.clone();
         if let Some(folder) = plugins.as_ref().filter(|folder| !folder.is_dir()) {

@@ -1,7 +1,6 @@
 //! The images of both sides: judged as they come, so that a thousand seeds take the memory of one, and kept
 //! as means where somebody wants to look at them.
 
-use std::fs;
 use std::path::Path;
 
 use super::Failure;
@@ -68,9 +67,8 @@ impl Images {
     }
 
     /// Writes the mean images `mitsuba.exr` and `etendue.exr`, and `error.png`, a map of how many standard
-    /// errors they are apart.
+    /// errors they are apart, into a folder that is there.
     pub(super) fn keep(&self, folder: &Path) -> Result<(), Failure> {
-        fs::create_dir_all(folder).map_err(|e| Error::system("make", folder, &e))?;
         for (mean, name) in self.means.iter().zip(["mitsuba.exr", "etendue.exr"]) {
             if let Some(image) = &mean.image {
                 display::save(&folder.join(name), image, &Metadata::default())?;

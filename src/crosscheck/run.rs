@@ -67,6 +67,10 @@ pub fn crosscheck(
         plugins: settings.plugins.clone(),
         folder: folder.path().to_owned(),
     };
+    if let Some(folder) = &settings.keep {
+        // Before the work, for it may be refused.
+        fs::create_dir_all(folder).map_err(|e| Error::system("make", folder, &e))?;
+    }
     let total = 2 * settings.seeds;
     watch.at(Side::Etendue, 0, total);
     let (program, arguments) = &settings.etendue;
