@@ -68,6 +68,15 @@ pub(super) fn seconds(text: &str) -> Parsed<std::time::Duration> {
     Ok(std::time::Duration::from_secs_f64(seconds))
 }
 
+/// A positive part of a whole: `0.005`.
+pub(super) fn part(text: &str) -> Parsed<f64> {
+    let part: f64 = text.parse().map_err(|_| "write a number such as 0.005")?;
+    if !(part > 0.0 && part.is_finite()) {
+        return Err(format!("{text} is not positive"));
+    }
+    Ok(part)
+}
+
 /// A number of bytes: `500M`, `8G`, `7.5GiB`; `none` is without limit.
 pub(super) fn bytes(text: &str) -> Parsed<u64> {
     if text == "none" {

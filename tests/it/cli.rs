@@ -107,6 +107,7 @@ fn help_reads_as_it_was_blessed() {
         ("compare", &["compare", "--help"]),
         ("info", &["info", "--help"]),
         ("relight", &["relight", "--help"]),
+        ("crosscheck", &["crosscheck", "--help"]),
     ] {
         let output = Command::new(env!("CARGO_BIN_EXE_etendue"))
             .args(arguments)

@@ -7,6 +7,7 @@ mod channels;
 mod cli;
 mod closed_form;
 mod compare;
+mod crosscheck;
 mod golden;
 mod inputs;
 mod layers;
