@@ -15,8 +15,10 @@ pub mod mesh;
 pub(crate) mod family;
 pub mod interaction;
 
+pub mod compare;
 pub mod display;
 pub mod filter;
+pub mod relight;
 pub mod sampler;
 pub mod shape;
 pub mod texture;
@@ -32,3 +34,5 @@ pub mod scene;
 pub mod integrator;
 
 pub mod render;
+
+pub mod crosscheck;

@@ -1,4 +1,5 @@
-//! A group of shapes with its tree: the items (primitives and instances) in the order of the leaves.
+//! A group of shapes with its tree: the items (primitives and instances) in the order of the leaves. What has
+//! no finite box stands beside the tree, in a short list that every ray is held against.
 
 use crate::shape::Bounds;
 
@@ -37,16 +38,27 @@ impl Item {
 /// See the module.
 #[derive(Debug)]
 pub(super) struct Group {
+    unbounded: Vec<Item>,
     items: Vec<Item>,
     tree: Tree,
     bounds: Bounds,
 }
 
 impl Group {
-    pub(super) fn new((items, boxes): (Vec<Item>, Vec<Bounds>), method: Method) -> Self {
+    pub(super) fn new(placed: impl Iterator<Item = (Item, Bounds)>, method: Method) -> Self {
+        let (mut unbounded, mut items, mut boxes) = (Vec::new(), Vec::new(), Vec::new());
+        for (item, bounds) in placed {
+            if bounds.is_unbounded() {
+                unbounded.push(item);
+            } else {
+                items.push(item);
+                boxes.push(bounds);
+            }
+        }
         let bounds = boxes.iter().copied().fold(Bounds::EMPTY, Bounds::union);
         match method {
             Method::Brute => Self {
+                unbounded,
                 items,
                 tree: Tree::default(),
                 bounds,
@@ -55,6 +67,7 @@ impl Group {
                 let (tree, order) = Tree::build(&boxes);
                 let items = order.into_iter().map(|i| items[i as usize]).collect();
                 Self {
+                    unbounded,
                     items,
                     tree,
                     bounds,
@@ -63,6 +76,12 @@ impl Group {
         }
     }
 
+    /// What the tree does not hold.
+    pub(super) fn unbounded(&self) -> &[Item] {
+        &self.unbounded
+    }
+
+    /// What the tree holds.
     pub(super) fn items(&self) -> &[Item] {
         &self.items
     }
@@ -71,11 +90,12 @@ impl Group {
         &self.tree
     }
 
+    /// A box around what the tree holds.
     pub(super) fn bounds(&self) -> Bounds {
         self.bounds
     }
 
     pub(super) fn bytes(&self) -> usize {
-        self.items.len() * size_of::<Item>() + self.tree.bytes()
+        (self.unbounded.len() + self.items.len()) * size_of::<Item>() + self.tree.bytes()
     }
 }

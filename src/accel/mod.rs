@@ -93,22 +93,22 @@ impl Tracer {
                     .map(move |p| (Item::primitive(i as u32, p), shape.bounds(p)))
             })
         };
-        let mut groups: Vec<Group> = (1..count)
-            .map(|g| Group::new(members(g).unzip(), method))
-            .collect();
+        let mut groups: Vec<Group> = (1..count).map(|g| Group::new(members(g), method)).collect();
         let instance_bounds: Vec<Bounds> = (instances.iter())
-            .map(
-                |instance| match groups[instance.group as usize - 1].bounds() {
+            .map(|instance| {
+                let group = &groups[instance.group as usize - 1];
+                match group.bounds() {
+                    _ if !group.unbounded().is_empty() => Bounds::EVERYTHING,
                     bounds if bounds.is_empty() => bounds,
                     bounds => bounds.transformed(&instance.to_world),
-                },
-            )
+                }
+            })
             .collect();
         let placed = (0..)
             .map(Item::instance)
             .zip(instance_bounds.iter().copied());
         let placed = placed.filter(|(_, bounds)| !bounds.is_empty());
-        let world = Group::new(members(0).chain(placed).unzip(), method);
+        let world = Group::new(members(0).chain(placed), method);
         groups.insert(0, world);
         Self {
             shapes,
@@ -119,7 +119,7 @@ impl Tracer {
         }
     }
 
-    /// A box around everything.
+    /// A box around everything that has an end.
     pub fn bounds(&self) -> Bounds {
         self.groups[0].bounds()
     }
@@ -227,6 +227,10 @@ impl<'t> Walk<'t> {
         let meet = |walk: &mut Self, item: &Item, best: &mut Hit| {
             walk.item::<ANY>(item, ray, (&boxes, &shear), (instance, entry), best)
         };
+        let mut endless = group.unbounded().iter();
+        if endless.any(|item| meet(self, item, best) && ANY) {
+            return true;
+        }
         match self.tracer.method {
             Method::Brute => group
                 .items()
@@ -315,5 +319,7 @@ impl<'t> Walk<'t> {
     }
 }
 
+#[cfg(test)]
+mod surface_tests;
 #[cfg(test)]
 mod tests;

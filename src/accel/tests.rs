@@ -87,7 +87,9 @@ fn the_tree_and_brute_force_find_the_same_hits_to_the_bit() {
 #[test]
 fn surfaces_with_equations_are_found_alike_in_the_world_and_in_instances() {
     let text = r#"<scene version="3.0.0"><shape type="sphere"><float name="radius" value="0.7"/></shape>
-        <shape type="disk"/><shape type="cylinder"><float name="radius" value="0.4"/></shape></scene>"#;
+        <shape type="disk"/><shape type="cylinder"><float name="radius" value="0.4"/></shape>
+        <shape type="plane"><transform name="to_world"><rotate x="1" angle="20"/><translate z="-0.9"/></transform>
+        </shape></scene>"#;
     let scene = Description::parse(text, Path::new("test.xml"), &Options::default()).unwrap();
     let build = |p: &Properties<'_>| Arc::new(shape::build(p).unwrap().geometry);
     let shapes: Vec<_> = scene
@@ -100,9 +102,13 @@ fn surfaces_with_equations_are_found_alike_in_the_world_and_in_instances() {
     let transform = DMat4::from_rotation_x(1.0) * DMat4::from_scale(DVec3::new(1.0, -0.5, 2.0));
     let to_world = Transform::new(&transform).unwrap();
     let instances = [Instance { to_world, group: 1 }];
-    let tracers = both(&twice, &[0, 0, 0, 1, 1, 1], &instances);
+    let tracers = both(&twice, &[0, 0, 0, 0, 1, 1, 1, 1], &instances);
     let rays = rays(20_000, &[Vec3::ZERO, Vec3::X, Vec3::new(0.0, 0.4, 0.5)]);
     assert!(agree(&tracers, &rays) > 10_000);
+    for tracer in &tracers {
+        let Bounds { min, max } = tracer.bounds();
+        assert!((max - min).max_element() < 3.0, "the plane is left out");
+    }
 }
 
 #[test]

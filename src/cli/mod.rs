@@ -2,10 +2,14 @@
 //!
 //! Exit status: 0 done; 1 the input is wrong or asks for what Étendue lacks; 2 the command line is wrong;
 //! 3 the system refused (a file that cannot be read or written); 130 stopped by a signal, after writing
-//! what was complete. Of several images the gravest counts.
+//! what was complete. Of several images the gravest counts. `compare` and `crosscheck` answer with
+//! 0 agree, 1 differ, 2 cannot compare.
 
 mod check;
+mod compare;
+mod crosscheck;
 mod info;
+mod relight;
 mod render;
 
 mod batch;
@@ -19,6 +23,7 @@ mod status;
 mod stop;
 mod summary;
 mod turntable;
+mod verdicts;
 
 use std::process::ExitCode;
 
@@ -37,15 +42,28 @@ struct Arguments {
 enum Command {
     Render(Box<render::Arguments>),
     Check(check::Arguments),
+    Compare(Box<compare::Arguments>),
+    Crosscheck(Box<crosscheck::Arguments>),
     Info(info::Arguments),
+    Relight(relight::Arguments),
+    /// Étendue's side of a crosscheck, which starts it: answers orders on standard input
+    #[command(hide = true)]
+    CrosscheckWorker,
 }
+
+/// The name of the hidden command that serves [`Command::Crosscheck`].
+const CROSSCHECK_WORKER: &str = "crosscheck-worker";
 
 /// Runs the command that the arguments name.
 pub(crate) fn run() -> ExitCode {
     let result = match Arguments::parse().command {
         Command::Render(arguments) => render::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
+        Command::Compare(arguments) => compare::run(&arguments),
+        Command::Crosscheck(arguments) => crosscheck::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
+        Command::Relight(arguments) => relight::run(&arguments),
+        Command::CrosscheckWorker => crosscheck::serve(),
     };
     match result {
         Ok(status) => ExitCode::from(status),

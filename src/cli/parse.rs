@@ -1,5 +1,6 @@
 //! The values of options: from text to numbers, windows, sizes and frames.
 
+use etendue::relight::Weight;
 use etendue::sensor::Window;
 
 type Parsed<T> = Result<T, String>;
@@ -36,6 +37,26 @@ pub(super) fn define(text: &str) -> Parsed<(String, String)> {
     Ok((name.to_owned(), value.to_owned()))
 }
 
+/// `diffuse=0.5` or `light.lamp=2,1,0.5`
+pub(super) fn weight(text: &str) -> Parsed<Weight> {
+    const HOW: &str = "write it as name=0.5 or name=2,1,0.5";
+    // Names may hold an equals sign, numbers do not.
+    let (name, numbers) = text.rsplit_once('=').ok_or(HOW)?;
+    let numbers: Option<Vec<f32>> = numbers.split(',').map(|t| t.trim().parse().ok()).collect();
+    let factors = match numbers.as_deref() {
+        Some([grey]) => [*grey; 3],
+        Some([r, g, b]) => [*r, *g, *b],
+        _ => return Err(HOW.to_owned()),
+    };
+    if !factors.iter().all(|f| f.is_finite() && *f >= 0.0) {
+        return Err("weights are finite and not negative".to_owned());
+    }
+    Ok(Weight {
+        name: name.to_owned(),
+        factors,
+    })
+}
+
 /// A positive number of seconds.
 pub(super) fn seconds(text: &str) -> Parsed<std::time::Duration> {
     /// About thirty years: nothing overflows.
@@ -48,13 +69,12 @@ pub(super) fn seconds(text: &str) -> Parsed<std::time::Duration> {
 }
 
 /// A positive number.
-pub(super) fn positive(text: &str) -> Parsed<f32> {
-    let number: f32 = text.parse().map_err(|_| "write a number")?;
-    if number > 0.0 && number.is_finite() {
-        Ok(number)
-    } else {
-        Err(format!("{text} is not positive"))
+pub(super) fn positive(text: &str) -> Parsed<f64> {
+    let number: f64 = text.parse().map_err(|_| "write a number such as 0.005")?;
+    if !(number > 0.0 && number.is_finite()) {
+        return Err(format!("{text} is not positive"));
     }
+    Ok(number)
 }
 
 /// A number of bytes: `500M`, `8G`, `7.5GiB`; `none` is without limit.
@@ -164,6 +184,29 @@ mod tests {
             "-9223372036854775808:0",
         ] {
             assert!(list(wrong).is_err(), "{wrong:?}");
+        }
+    }
+
+    #[test]
+    fn weights_are_one_number_or_three() {
+        let parsed = |text| weight(text).map(|w| (w.name, w.factors));
+        assert_eq!(parsed("a.b=2"), Ok(("a.b".to_owned(), [2.0; 3])));
+        assert_eq!(
+            parsed("a=b=1, 0,.5"),
+            Ok(("a=b".to_owned(), [1.0, 0.0, 0.5]))
+        );
+        for wrong in [
+            "",
+            "a",
+            "a=",
+            "a=1,2",
+            "a=1,2,3,4",
+            "a=-1",
+            "a=inf",
+            "a=NaN",
+            "a=x",
+        ] {
+            assert!(weight(wrong).is_err(), "{wrong:?}");
         }
     }
 

@@ -74,7 +74,7 @@ pub(super) struct Arguments {
     /// Give each part of the image as many samples as its noise asks for: none is noisier than T, the standard
     /// error of a pixel's luminance L divided by the square root of L. EXR gets the channels "samples" and "error"
     #[arg(long, value_name = "T", value_parser = parse::positive, conflicts_with = "spp", help_heading = ADAPTIVE)]
-    noise_threshold: Option<f32>,
+    noise_threshold: Option<f64>,
     /// The fewest samples a pixel; more where the sampler's sets are larger
     #[arg(long, default_value_t = 32, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 24), requires = "noise_threshold", help_heading = ADAPTIVE)]
     min_spp: u32,

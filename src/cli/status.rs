@@ -6,6 +6,10 @@ use etendue::error::{Error, Kind};
 pub(super) const DONE: u8 = 0;
 /// The input is wrong or asks for what Étendue lacks.
 pub(super) const INPUT: u8 = 1;
+/// Compared images differ.
+pub(super) const DIFFERS: u8 = 1;
+/// Images cannot be compared.
+pub(super) const CANNOT_COMPARE: u8 = 2;
 /// The system refused.
 pub(super) const SYSTEM: u8 = 3;
 /// A signal asked to stop; what was complete is written.

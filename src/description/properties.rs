@@ -46,6 +46,25 @@ impl<'a> Properties<'a> {
         &self.node.plugin
     }
 
+    /// The plugin's name, asked by somebody who does not build it.
+    pub fn peek_plugin(&self) -> &'a str {
+        &self.node.plugin
+    }
+
+    /// The nested plugins of that kind, asked by somebody who does not build them: none counts as read.
+    pub fn peek_children(&self, kind: Kind) -> impl Iterator<Item = Properties<'a>> {
+        let description = self.description;
+        let children = self
+            .node
+            .properties
+            .iter()
+            .filter_map(move |p| match p.value {
+                Value::Object(id) => Some(description.node(id)),
+                _ => None,
+            });
+        children.filter(move |child| child.kind() == kind)
+    }
+
     /// The name that references use.
     pub fn id(&self) -> Option<&'a str> {
         self.node.id.as_deref()

@@ -66,6 +66,9 @@ impl Decoder {
         if extension(path) == "tga" {
             return Ok(Self::Raster(ImageFormat::Tga));
         }
+        if bytes.is_empty() {
+            return Err(Error::input("the file is empty"));
+        }
         Err(Error::input("the file is no image of a known format")
             .help("EXR, HDR, PNG, JPEG, BMP and TGA are known"))
     }

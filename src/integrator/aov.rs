@@ -2,7 +2,7 @@
 //! `name:kind, …`; nested integrators give the image itself (the first) and, where they have a name,
 //! channels `name.R` and so on. Where the camera sees nothing a channel is 0.
 
-use super::{Estimate, Estimates, Estimator, Integrator, Start, Stats};
+use super::{Context, Estimate, Estimates, Estimator, Integrator, Start, Stats};
 use crate::color::{ColorModel, Spectral};
 use crate::description::{Kind, Properties, Property, Value};
 use crate::error::Result;
@@ -55,7 +55,7 @@ pub struct Aov<C: ColorModel> {
 }
 
 impl<C: ColorModel> Aov<C> {
-    pub(super) fn build(properties: &Properties<'_>, context: &()) -> Result<Self> {
+    pub(super) fn build(properties: &Properties<'_>, context: &Context) -> Result<Self> {
         let mut quantities = Vec::new();
         for item in properties
             .string("aovs")?

@@ -1,6 +1,6 @@
 //! `depth`: the distance from the camera to what it sees, as a grey; 0 where it sees nothing.
 
-use super::{Estimate, Estimates, Estimator, Start, Stats};
+use super::{Context, Estimate, Estimates, Estimator, Start, Stats};
 use crate::color::{ColorModel, Spectral};
 use crate::description::Properties;
 use crate::error::Result;
@@ -13,7 +13,7 @@ use crate::scene::Scene;
 pub struct Depth;
 
 impl Depth {
-    pub(super) fn build(_properties: &Properties<'_>, _context: &()) -> Result<Self> {
+    pub(super) fn build(_properties: &Properties<'_>, _context: &Context) -> Result<Self> {
         Ok(Self)
     }
 }

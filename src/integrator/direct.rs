@@ -3,7 +3,7 @@
 //! sampling. Equal to `path` at `max_depth` 2 in the mean.
 
 use super::mis::power;
-use super::{Estimate, Estimates, Estimator, FIRST_DIMENSION, Start, Stats};
+use super::{Context, Estimate, Estimates, Estimator, FIRST_DIMENSION, Start, Stats};
 use crate::color::{ColorModel, Spectral};
 use crate::description::Properties;
 use crate::error::Result;
@@ -35,7 +35,7 @@ struct Probe<S> {
 const MAX_SAMPLES: i64 = 1 << 12;
 
 impl Direct {
-    pub(super) fn build(properties: &Properties<'_>, _context: &()) -> Result<Self> {
+    pub(super) fn build(properties: &Properties<'_>, _context: &Context) -> Result<Self> {
         let count = |name: &'static str, default: u32| {
             let n = properties.integer(name)?.unwrap_or(i64::from(default));
             if !(0..=MAX_SAMPLES).contains(&n) {
@@ -110,9 +110,12 @@ impl<C: ColorModel> Estimator<C> for Direct {
                 Some(at) => scene.emitted(at, start.ray.origin, w),
                 None => scene.surrounding(start.ray.direction, w),
             };
-            let radiance = emission
+            let mut radiance = emission
                 .filter(|_| !self.hide_emitters)
                 .map_or(C::Sample::zero(), |e| e.0);
+            if let Some(ambient) = at.as_ref().and_then(|at| scene.ambient(at, w)) {
+                radiance += ambient;
+            }
             let surrounded = scene.has_environment() && !self.hide_emitters;
             let alpha = if at.is_some() || surrounded { 1.0 } else { 0.0 };
             estimates.push(Estimate {
@@ -192,10 +195,13 @@ impl<C: ColorModel> Estimator<C> for Direct {
         for (probe, hit) in probes.iter().zip(&hits) {
             let w = &starts[probe.slot as usize].wavelengths;
             let from = probe.scattered.map_or(probe.ray.origin, |(from, _)| from);
-            let emission = if hit.is_miss() {
-                scene.surrounding(probe.ray.direction, w)
-            } else {
-                scene.emitted(&scene.interaction(&probe.ray, hit), from, w)
+            let at = (!hit.is_miss()).then(|| scene.interaction(&probe.ray, hit));
+            if let Some(ambient) = at.as_ref().and_then(|at| scene.ambient(at, w)) {
+                estimates[probe.slot as usize].radiance += probe.factor * ambient;
+            }
+            let emission = match &at {
+                Some(at) => scene.emitted(at, from, w),
+                None => scene.surrounding(probe.ray.direction, w),
             };
             let Some((radiance, light_pdf)) = emission else {
                 continue;

@@ -7,9 +7,12 @@
 mod aov;
 mod depth;
 mod direct;
-mod mis;
 mod moment;
 mod path;
+mod phong;
+
+mod layers;
+mod mis;
 
 use crate::accel::Counts;
 use crate::color::ColorModel;
@@ -96,15 +99,24 @@ pub trait Estimator<C: ColorModel>: std::fmt::Debug + Send + Sync {
     );
 }
 
+/// What integrators are built with.
+#[derive(Clone, Debug, Default)]
+pub struct Context {
+    /// The names of the scene's lights in their order, as [`crate::scene::light_names`] gives them; the
+    /// integrator then serves scenes with these lights.
+    pub lights: Vec<String>,
+}
+
 family! {
     /// Every integrator there is.
     #[derive(Debug)]
-    pub enum Integrator<C>: Estimator, kind "integrator", context () {
+    pub enum Integrator<C>: Estimator, kind "integrator", context Context {
         "aov" => Aov(aov::Aov<C>),
         "depth" => Depth(depth::Depth),
         "direct" => Direct(direct::Direct),
         "moment" => Moment(moment::Moment<C>),
         "path" => Path(path::Path),
+        "phong" => Phong(phong::Phong),
     }
 }
 

@@ -1,7 +1,7 @@
 //! `moment`: renders its nested integrator. (Mitsuba's also writes the samples' squares; its scenes use
 //! it for their references, and the image is the nested one's.)
 
-use super::{Estimates, Estimator, Integrator, Start, Stats};
+use super::{Context, Estimates, Estimator, Integrator, Start, Stats};
 use crate::color::ColorModel;
 use crate::description::{Kind, Properties};
 use crate::error::Result;
@@ -15,7 +15,7 @@ pub struct Moment<C: ColorModel> {
 }
 
 impl<C: ColorModel> Moment<C> {
-    pub(super) fn build(properties: &Properties<'_>, context: &()) -> Result<Self> {
+    pub(super) fn build(properties: &Properties<'_>, context: &Context) -> Result<Self> {
         match &properties.children(Kind::Integrator)[..] {
             [child] => Ok(Self {
                 nested: Box::new(Integrator::<C>::build(child, context)?),

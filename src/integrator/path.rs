@@ -5,7 +5,7 @@
 //! Roulette starts at `rr_depth` (5) and lets a path live with probability min(max(throughput)·η², 0.95).
 
 use super::mis::power;
-use super::{Estimate, Estimates, Estimator, FIRST_DIMENSION, Start, Stats};
+use super::{Context, Estimate, Estimates, Estimator, FIRST_DIMENSION, Start, Stats};
 use crate::color::{ColorModel, Spectral};
 use crate::description::Properties;
 use crate::error::Result;
@@ -16,20 +16,57 @@ use crate::scene::Scene;
 use glam::Vec3;
 
 /// The path tracer's settings.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Path {
-    max_depth: u32,
-    rr_depth: u32,
+    limits: Limits,
     hide_emitters: bool,
 }
 
-impl Default for Path {
+/// How long a path may become: `max_depth` and `rr_depth`.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Limits {
+    /// Edges; `u32::MAX` is no limit.
+    pub(super) max_depth: u32,
+    rr_depth: u32,
+}
+
+impl Default for Limits {
     fn default() -> Self {
         Self {
             max_depth: u32::MAX,
             rr_depth: 5,
-            hide_emitters: false,
         }
+    }
+}
+
+impl Limits {
+    pub(super) fn build(properties: &Properties<'_>) -> Result<Self> {
+        let depth = |name: &'static str, default: i64, least: i64| {
+            let depth = properties.integer(name)?.unwrap_or(default);
+            if depth < least {
+                return Err(properties.error(
+                    name,
+                    format!("{name} must be at least {least}, and {depth} is not"),
+                ));
+            }
+            Ok(u32::try_from(depth).unwrap_or(u32::MAX))
+        };
+        Ok(Self {
+            max_depth: depth("max_depth", -1, -1)?,
+            rr_depth: depth("rr_depth", 5, 1)?,
+        })
+    }
+
+    /// The probability with which roulette lets a path live on after its bounce at `depth`; `None` where it
+    /// carries nothing.
+    pub(super) fn survival<S: Spectral>(&self, depth: u32, throughput: S, eta: f32) -> Option<f32> {
+        if throughput.is_black() {
+            return None;
+        }
+        if depth + 1 < self.rr_depth {
+            return Some(1.0);
+        }
+        Some((throughput.max_value() * eta * eta).min(MAX_SURVIVAL))
     }
 }
 
@@ -63,20 +100,9 @@ struct Shadow<S> {
 }
 
 impl Path {
-    pub(super) fn build(properties: &Properties<'_>, _context: &()) -> Result<Self> {
-        let depth = |name: &'static str, default: i64, least: i64| {
-            let depth = properties.integer(name)?.unwrap_or(default);
-            if depth < least {
-                return Err(properties.error(
-                    name,
-                    format!("{name} must be at least {least}, and {depth} is not"),
-                ));
-            }
-            Ok(u32::try_from(depth).unwrap_or(u32::MAX))
-        };
+    pub(super) fn build(properties: &Properties<'_>, _context: &Context) -> Result<Self> {
         Ok(Self {
-            max_depth: depth("max_depth", -1, -1)?,
-            rr_depth: depth("rr_depth", 5, 1)?,
+            limits: Limits::build(properties)?,
             hide_emitters: properties.boolean("hide_emitters")?.unwrap_or(false),
         })
     }
@@ -103,6 +129,10 @@ impl Path {
                 .scattered
                 .map_or(1.0, |(_, pdf)| power(pdf, light_pdf));
             estimate.radiance += walker.throughput * radiance * weight;
+        }
+        let ambient = |at| scene.ambient(at, &walker.wavelengths);
+        if let Some(ambient) = at.as_ref().and_then(ambient) {
+            estimate.radiance += walker.throughput * ambient;
         }
         if depth == 0 {
             let surrounded = scene.has_environment() && !self.hide_emitters;
@@ -166,17 +196,11 @@ impl Path {
         walker.eta *= sample.eta;
         walker.ray = at.spawn(at.frame.to_world(sample.wo));
         walker.scattered = (!sample.delta).then_some((at.position, sample.pdf));
-        if walker.throughput.is_black() {
+        let survival = self.limits.survival(depth, walker.throughput, walker.eta)?;
+        if survival < 1.0 && walker.stream.next_1d(sampler) >= survival {
             return None;
         }
-        if depth + 1 >= self.rr_depth {
-            let survival =
-                (walker.throughput.max_value() * walker.eta * walker.eta).min(MAX_SURVIVAL);
-            if walker.stream.next_1d(sampler) >= survival {
-                return None;
-            }
-            walker.throughput = walker.throughput / survival;
-        }
+        walker.throughput = walker.throughput / survival;
         Some(walker)
     }
 }
@@ -199,7 +223,7 @@ impl<C: ColorModel> Estimator<C> for Path {
                 alpha: 0.0,
             },
         );
-        if self.max_depth == 0 {
+        if self.limits.max_depth == 0 {
             return;
         }
         let mut walkers: Vec<Walker<C>> = starts
@@ -242,7 +266,7 @@ impl<C: ColorModel> Estimator<C> for Path {
                         hit,
                         &mut estimates[walker.slot as usize],
                     )?;
-                    if depth + 1 >= self.max_depth {
+                    if depth + 1 >= self.limits.max_depth {
                         return None;
                     }
                     stats.shaded += 1;

@@ -1,5 +1,6 @@
 //! Lights: what emits, how much arrives from where, and how to draw a direction toward it.
 
+mod ambient;
 mod area;
 mod brightness;
 mod constant;
@@ -62,6 +63,15 @@ pub trait Emitter<C: ColorModel>: std::fmt::Debug + Send + Sync {
         0.0
     }
 
+    /// Whether it comes from nowhere, so that there is no direction to draw.
+    fn is_ambient(&self) -> bool {
+        false
+    }
+    /// What an ambient light brings to every point.
+    fn ambient_radiance(&self, _wavelengths: &C::Wavelengths) -> C::Sample {
+        C::Sample::zero()
+    }
+
     /// Whether it is an environment: what a ray meets that meets nothing.
     fn is_environment(&self) -> bool {
         false
@@ -89,6 +99,7 @@ family! {
     /// Every light there is.
     #[derive(Clone, Debug)]
     pub enum Light<C>: Emitter, kind "emitter", context LightContext<'_, C> {
+        "ambient" => Ambient(ambient::Ambient<C>),
         "area" => Area(area::Area<C>),
         "constant" => Constant(constant::Constant<C>),
         "directional" => Directional(directional::Directional<C>),

@@ -4,7 +4,7 @@
 
 use glam::{Vec2, Vec3};
 
-use super::{Bsdf, BsdfSample, BsdfValue, Lobes, Material, fraction, nested};
+use super::{Bsdf, BsdfSample, BsdfValue, Lobes, Material, PhongTerms, fraction, nested};
 use crate::color::{ColorModel, Mono};
 use crate::description::Properties;
 use crate::error::Result;
@@ -89,5 +89,32 @@ impl<C: ColorModel> Bsdf<C> for BlendBsdf<C> {
         }
         self.eval(at, wi, sample.wo, w)?
             .as_sample(sample.wo, sample.eta)
+    }
+
+    fn phong(
+        &self,
+        at: &Interaction<'_>,
+        wi: Vec3,
+        wo: Vec3,
+        w: &C::Wavelengths,
+    ) -> Option<PhongTerms<C::Sample>> {
+        let weight = fraction(&self.weight, at);
+        let part = |i: usize, weight: f32| {
+            let terms = self.nested[i].phong(at, wi, wo, w)?;
+            Some(terms.weighted(weight))
+        };
+        match (part(0, 1.0 - weight), part(1, weight)) {
+            (Some(a), Some(b)) => Some(PhongTerms {
+                diffuse: a.diffuse + b.diffuse,
+                specular: a.specular + b.specular,
+            }),
+            (a, b) => a.or(b),
+        }
+    }
+
+    fn ambient(&self, at: &Interaction<'_>, wi: Vec3, w: &C::Wavelengths) -> C::Sample {
+        let weight = fraction(&self.weight, at);
+        let [first, second] = [0, 1].map(|i: usize| self.nested[i].ambient(at, wi, w));
+        first * (1.0 - weight) + second * weight
     }
 }

@@ -4,7 +4,7 @@ use std::f32::consts::FRAC_1_PI;
 
 use glam::{Vec2, Vec3};
 
-use super::{Bsdf, BsdfSample, BsdfValue, Lobes};
+use super::{Bsdf, BsdfSample, BsdfValue, Lobes, PhongTerms};
 use crate::color::{Color, ColorModel, Role, Spectral};
 use crate::description::Properties;
 use crate::error::Result;
@@ -77,6 +77,19 @@ impl<C: ColorModel> Bsdf<C> for Diffuse<C> {
             pdf,
             eta: 1.0,
             delta: false,
+        })
+    }
+
+    fn phong(
+        &self,
+        at: &Interaction<'_>,
+        wi: Vec3,
+        wo: Vec3,
+        w: &C::Wavelengths,
+    ) -> Option<PhongTerms<C::Sample>> {
+        (wi.z > 0.0 && wo.z > 0.0).then(|| PhongTerms {
+            diffuse: self.reflectance.eval(at, w) * wo.z,
+            specular: C::Sample::zero(),
         })
     }
 }

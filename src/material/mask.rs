@@ -2,7 +2,7 @@
 
 use glam::{Vec2, Vec3};
 
-use super::{Bsdf, BsdfSample, BsdfValue, Lobes, Material, fraction, nested};
+use super::{Bsdf, BsdfSample, BsdfValue, Lobes, Material, PhongTerms, fraction, nested};
 use crate::color::{ColorModel, Mono, Spectral};
 use crate::description::Properties;
 use crate::error::Result;
@@ -67,5 +67,20 @@ impl<C: ColorModel> Bsdf<C> for Mask<C> {
             pdf: sample.pdf * opacity,
             ..sample
         })
+    }
+
+    fn phong(
+        &self,
+        at: &Interaction<'_>,
+        wi: Vec3,
+        wo: Vec3,
+        w: &C::Wavelengths,
+    ) -> Option<PhongTerms<C::Sample>> {
+        let terms = self.nested.phong(at, wi, wo, w)?;
+        Some(terms.weighted(fraction(&self.opacity, at)))
+    }
+
+    fn ambient(&self, at: &Interaction<'_>, wi: Vec3, w: &C::Wavelengths) -> C::Sample {
+        self.nested.ambient(at, wi, w) * fraction(&self.opacity, at)
     }
 }

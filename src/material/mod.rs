@@ -10,6 +10,7 @@ mod diffuse;
 mod mask;
 mod normalmap;
 mod null;
+mod phong;
 mod plastic;
 mod principled;
 mod principledthin;
@@ -56,6 +57,26 @@ pub struct BsdfValue<S> {
     pub value: S,
     /// The density with which [`Bsdf::sample`] draws `wo`, in 1/sr.
     pub pdf: f32,
+}
+
+/// What Phong's equation as textbooks write it, I = I_a·k_a + Σ I_i·[k_d·max(0, L·N) + k_s·max(0, R·V)ⁿ],
+/// multiplies a light's I_i by. Nothing in it is normalised.
+#[derive(Clone, Copy, Debug)]
+pub struct PhongTerms<S> {
+    /// k_d·max(0, L·N), whoever looks on.
+    pub diffuse: S,
+    /// k_s·max(0, R·V)ⁿ where L·N > 0.
+    pub specular: S,
+}
+
+impl<S: Spectral> PhongTerms<S> {
+    /// The terms of a material that shows only this share of itself.
+    fn weighted(self, weight: f32) -> Self {
+        Self {
+            diffuse: self.diffuse * weight,
+            specular: self.specular * weight,
+        }
+    }
 }
 
 impl<S> BsdfSample<S> {
@@ -134,6 +155,32 @@ pub trait Bsdf<C: ColorModel>: std::fmt::Debug + Send + Sync {
         straight.map_or(C::Sample::zero(), |v| v.value * std::f32::consts::PI)
     }
 
+    /// The material's part in Phong's equation. One that has none there gives π times its value, so that
+    /// a matte one has k_d = reflectance; as it may depend on the viewer, that counts as specular.
+    fn phong(
+        &self,
+        at: &Interaction<'_>,
+        wi: Vec3,
+        wo: Vec3,
+        wavelengths: &C::Wavelengths,
+    ) -> Option<PhongTerms<C::Sample>> {
+        let value = self.eval(at, wi, wo, wavelengths)?;
+        Some(PhongTerms {
+            diffuse: C::Sample::zero(),
+            specular: value.value * std::f32::consts::PI,
+        })
+    }
+
+    /// The share of ambient light, which comes from nowhere and is never shadowed, that leaves toward `wi`.
+    fn ambient(
+        &self,
+        _at: &Interaction<'_>,
+        _wi: Vec3,
+        _wavelengths: &C::Wavelengths,
+    ) -> C::Sample {
+        C::Sample::zero()
+    }
+
     /// Draws `wo`: `u1` chooses the lobe, `u2` the direction.
     fn sample(
         &self,
@@ -157,6 +204,7 @@ family! {
         "mask" => Mask(mask::Mask<C>),
         "normalmap" => NormalMap(normalmap::NormalMap<C>),
         "null" => Null(null::Null),
+        "phong" => Phong(phong::Phong<C>),
         "plastic" => Plastic(plastic::Plastic<C>),
         "principled" => Principled(principled::Principled<C>),
         "principledthin" => PrincipledThin(principledthin::PrincipledThin<C>),
@@ -214,18 +262,24 @@ fn fraction(texture: &Texture<Mono>, at: &Interaction<'_>) -> f32 {
 
 /// The mean of a colour over texture coordinates and channels, by some samples: for choosing lobes.
 fn mean<C: ColorModel>(palettes: &Palettes<C>, texture: &Texture<C>) -> f32 {
-    const STEPS: u16 = 16;
-    let color = &palettes.colors.color;
-    let channels: f32 = (0..C::Sample::LANES).map(|i| color.unit()[i]).sum();
-    let step = |i: u16| (f32::from(i) + 0.5) / f32::from(STEPS);
-    let mut sum = 0.0;
-    for i in 0..STEPS * STEPS {
-        let uv = Vec2::new(step(i % STEPS), step(i / STEPS));
-        let wavelengths = color.wavelengths(step(i % STEPS));
-        let value = texture.eval(&Interaction::at_uv(uv), &wavelengths) * color.unit();
-        sum += (0..C::Sample::LANES).map(|c| value[c]).sum::<f32>();
+    let unit = palettes.colors.color.unit();
+    let total = |value: C::Sample| (0..C::Sample::LANES).map(|c| value[c]).sum::<f32>();
+    let (mut sum, mut count) = (0.0, 0.0);
+    for value in samples(&palettes.colors.color, texture) {
+        sum += total(value * unit);
+        count += 1.0;
     }
-    sum / (channels * f32::from(STEPS * STEPS))
+    sum / (total(unit) * count)
+}
+
+/// A texture's values at points spread over texture coordinates and wavelengths.
+fn samples<C: ColorModel>(color: &C, texture: &Texture<C>) -> impl Iterator<Item = C::Sample> {
+    const STEPS: u16 = 16;
+    let step = |i: u16| (f32::from(i) + 0.5) / f32::from(STEPS);
+    (0..STEPS * STEPS).map(move |i| {
+        let uv = Vec2::new(step(i % STEPS), step(i / STEPS));
+        texture.eval(&Interaction::at_uv(uv), &color.wavelengths(step(i % STEPS)))
+    })
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@
 use glam::{Vec2, Vec3};
 
 use super::perturbed::Perturbed;
-use super::{Bsdf, BsdfSample, BsdfValue, Lobes};
+use super::{Bsdf, BsdfSample, BsdfValue, Lobes, PhongTerms};
 use crate::color::{Color, ColorModel, Rgb, Role};
 use crate::description::Properties;
 use crate::error::Result;
@@ -65,5 +65,19 @@ impl<C: ColorModel> Bsdf<C> for NormalMap<C> {
     ) -> Option<BsdfSample<C::Sample>> {
         let frame = self.frame(at, wi);
         self.material.sample(at, &frame, wi, (u1, u2), w)
+    }
+
+    fn phong(
+        &self,
+        at: &Interaction<'_>,
+        wi: Vec3,
+        wo: Vec3,
+        w: &C::Wavelengths,
+    ) -> Option<PhongTerms<C::Sample>> {
+        self.material.phong(at, &self.frame(at, wi), wi, wo, w)
+    }
+
+    fn ambient(&self, at: &Interaction<'_>, wi: Vec3, w: &C::Wavelengths) -> C::Sample {
+        self.material.ambient(at, &self.frame(at, wi), wi, w)
     }
 }

@@ -4,7 +4,7 @@
 
 use glam::{Vec2, Vec3};
 
-use super::{BsdfSample, BsdfValue, Material, nested};
+use super::{BsdfSample, BsdfValue, Material, PhongTerms, nested};
 use crate::color::ColorModel;
 use crate::description::Properties;
 use crate::error::Result;
@@ -72,6 +72,34 @@ impl<C: ColorModel> Perturbed<C> {
             value: value.value * self.shadowing(frame, wo),
             pdf: value.pdf,
         })
+    }
+
+    /// The terms about the turned normal; the textbook knows no shadowing of bumps.
+    pub(super) fn phong(
+        &self,
+        at: &Interaction<'_>,
+        frame: &Frame,
+        wi: Vec3,
+        wo: Vec3,
+        w: &C::Wavelengths,
+    ) -> Option<PhongTerms<C::Sample>> {
+        let turned = frame.to_local(wo);
+        if turned.z * wo.z <= 0.0 {
+            return None;
+        }
+        let (inner, wi) = turned_interaction(at, frame, wi);
+        self.nested.phong(&inner, wi, turned, w)
+    }
+
+    pub(super) fn ambient(
+        &self,
+        at: &Interaction<'_>,
+        frame: &Frame,
+        wi: Vec3,
+        w: &C::Wavelengths,
+    ) -> C::Sample {
+        let (inner, wi) = turned_interaction(at, frame, wi);
+        self.nested.ambient(&inner, wi, w)
     }
 
     pub(super) fn sample(

@@ -2,7 +2,7 @@
 
 use glam::{Vec2, Vec3};
 
-use super::{Bsdf, BsdfSample, BsdfValue, Lobes, Material, nested};
+use super::{Bsdf, BsdfSample, BsdfValue, Lobes, Material, PhongTerms, nested};
 use crate::color::ColorModel;
 use crate::description::Properties;
 use crate::error::Result;
@@ -81,5 +81,21 @@ impl<C: ColorModel> Bsdf<C> for TwoSided<C> {
             wo: sample.wo * flip,
             ..sample
         })
+    }
+
+    fn phong(
+        &self,
+        at: &Interaction<'_>,
+        wi: Vec3,
+        wo: Vec3,
+        w: &C::Wavelengths,
+    ) -> Option<PhongTerms<C::Sample>> {
+        let (material, flip) = self.side(wi);
+        material.phong(at, wi * flip, wo * flip, w)
+    }
+
+    fn ambient(&self, at: &Interaction<'_>, wi: Vec3, w: &C::Wavelengths) -> C::Sample {
+        let (material, flip) = self.side(wi);
+        material.ambient(at, wi * flip, w)
     }
 }

@@ -87,7 +87,7 @@ impl Ladder {
             pilot,
             set,
             steps,
-            noise_threshold: adaptive.noise_threshold.into(),
+            noise_threshold: adaptive.noise_threshold,
         }
     }
 
@@ -139,7 +139,7 @@ impl Ladder {
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct AdaptiveReport {
     /// The noise that was asked for.
-    pub noise_threshold: f32,
+    pub noise_threshold: f64,
     /// The fewest and the most samples that a pixel could get, in whole sets.
     pub limits: [u32; 2],
     /// Samples a pixel of the crop, on average.

@@ -34,7 +34,7 @@ pub struct Checkpoint {
 pub struct Adaptive {
     /// The standard error of a pixel's luminance L that is aimed at, in proportion to √L; where L is below
     /// 0.01, to 0.1. Positive.
-    pub noise_threshold: f32,
+    pub noise_threshold: f64,
     /// The fewest samples that a pixel gets; whole sets of the sampler may be more.
     pub min_spp: u32,
     /// The most samples that a pixel gets; whole sets of the sampler may be more.

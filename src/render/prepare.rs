@@ -16,7 +16,7 @@ use crate::color::ColorModel;
 use crate::description::{Description, Kind, NodeId, Properties};
 use crate::error::{Error, Problem, Problems, Result};
 use crate::image::{Metadata, Window};
-use crate::integrator::{Estimator, Integrator};
+use crate::integrator::{self, Estimator, Integrator};
 use crate::sampler::Sampler;
 use crate::scene::{self, Assets, Scene};
 use crate::sensor::{Film, Sensor};
@@ -124,10 +124,13 @@ pub(super) fn view<C: ColorModel>(description: &Description, sensor: NodeId) -> 
         }
     };
     let (integrator, integrator_name) = match description.root().child(Kind::Integrator)? {
-        Some(child) => (
-            problems.take(Integrator::build(&child, &())),
-            child.plugin().to_owned(),
-        ),
+        Some(child) => {
+            let context = integrator::Context {
+                lights: scene::light_names(description),
+            };
+            let integrator = problems.take(Integrator::build(&child, &context));
+            (integrator, child.plugin().to_owned())
+        }
         None => (Some(Integrator::default()), "path".to_owned()),
     };
     problems.finish()?;

@@ -24,6 +24,7 @@ struct Builder<'d, C: ColorModel> {
     /// The materials that were made already, by node.
     known: HashMap<NodeId, MaterialId>,
     lights: Vec<Light<C>>,
+    ambients: Vec<Light<C>>,
     problems: Problems,
 }
 
@@ -45,6 +46,7 @@ impl<C: ColorModel> Builder<'_, C> {
         Some(id)
     }
 
+    /// Adds a light, and says where it is if it is somewhere.
     fn light(
         &mut self,
         properties: &Properties<'_>,
@@ -55,6 +57,10 @@ impl<C: ColorModel> Builder<'_, C> {
             shape,
         };
         let light = self.problems.take(Light::build(properties, &context))?;
+        if light.is_ambient() {
+            self.ambients.push(light);
+            return None;
+        }
         self.lights.push(light);
         Some(LightId(self.lights.len() as u32 - 1))
     }
@@ -92,16 +98,15 @@ impl<C: ColorModel> Builder<'_, C> {
         }
     }
 
-    fn surfacing(
-        &mut self,
-        properties: &Properties<'_>,
-        geometry: &Arc<Geometry>,
-    ) -> Option<Surfacing> {
+    fn surfacing(&mut self, member: &Member) -> Option<Surfacing> {
+        let Member { geometry, .. } = member;
+        let properties = &self.description.node(member.node);
         let emitter = self
             .problems
             .take(properties.child(Kind::Emitter))
             .flatten();
-        let bsdf = self.problems.take(properties.child(Kind::Bsdf)).flatten();
+        let own = self.problems.take(properties.child(Kind::Bsdf)).flatten();
+        let bsdf = own.or_else(|| Some(self.description.node(member.bsdf?)));
         for user in emitter.iter().chain(&bsdf) {
             self.check_attributes(properties, geometry, user);
         }
@@ -113,6 +118,18 @@ impl<C: ColorModel> Builder<'_, C> {
                 ));
                 self.problems
                     .push(error.at(emitter.location()).help("only \"area\" can"));
+                None
+            }
+            Some(emitter) if geometry.area().is_infinite() => {
+                let error = Error::input(format!(
+                    "a {} has no end, and cannot be a light",
+                    properties.plugin()
+                ));
+                self.problems.push(
+                    error
+                        .at(emitter.location())
+                        .help("let a large rectangle emit"),
+                );
                 None
             }
             Some(emitter) => self.light(emitter, Some(geometry)),
@@ -137,6 +154,9 @@ pub fn check_materials<C: ColorModel>(description: &Description, color: C) -> Re
     let mut seen = HashSet::new();
     let mut shapes = description.root().children(Kind::Shape);
     while let Some(shape) = shapes.pop() {
+        if !seen.insert(shape.node_id()) {
+            continue;
+        }
         shapes.extend(shape.children(Kind::Shape));
         for bsdf in shape.children(Kind::Bsdf) {
             if seen.insert(bsdf.node_id()) {
@@ -145,6 +165,27 @@ pub fn check_materials<C: ColorModel>(description: &Description, color: C) -> Re
         }
     }
     problems.finish()
+}
+
+/// The names of a scene's [`Scene::lights`] in their order: a light's id, or its shape's, or its number.
+pub fn light_names(description: &Description) -> Vec<String> {
+    let root = description.root();
+    let mut names = Vec::new();
+    let mut add = |light: &Properties<'_>, shape: Option<&Properties<'_>>| {
+        let id = light.id().or_else(|| shape?.id());
+        names.push(id.map_or_else(|| names.len().to_string(), str::to_owned));
+    };
+    for shape in root.peek_children(Kind::Shape) {
+        for light in shape.peek_children(Kind::Emitter) {
+            add(&light, Some(&shape));
+        }
+    }
+    for light in root.peek_children(Kind::Emitter) {
+        if light.peek_plugin() != "ambient" {
+            add(&light, None);
+        }
+    }
+    names
 }
 
 /// Builds the scene that `description` holds, with its geometry loaded.
@@ -160,12 +201,13 @@ pub fn build<C: ColorModel>(
         materials: Vec::new(),
         known: HashMap::new(),
         lights: Vec::new(),
+        ambients: Vec::new(),
         problems: Problems::default(),
     };
     let root = description.root();
     let mut surfacing = Vec::with_capacity(assets.shapes.len());
-    for Member { node, geometry, .. } in &assets.shapes {
-        surfacing.extend(builder.surfacing(&description.node(*node), geometry));
+    for member in &assets.shapes {
+        surfacing.extend(builder.surfacing(member));
     }
     let mut environment: Option<(LightId, Properties<'_>)> = None;
     for emitter in root.children(Kind::Emitter) {
@@ -187,7 +229,10 @@ pub fn build<C: ColorModel>(
     }
     builder.problems.finish()?;
     let Builder {
-        materials, lights, ..
+        materials,
+        lights,
+        ambients,
+        ..
     } = builder;
     let tracer = Tracer::new(
         assets.shapes.iter().map(|s| s.geometry.clone()).collect(),
@@ -202,6 +247,7 @@ pub fn build<C: ColorModel>(
         materials,
         lights,
         choice,
+        ambients,
         environment: environment.map(|(id, _)| id),
         surfacing,
     })

@@ -16,7 +16,7 @@ use crate::material::Material;
 use choice::Choice;
 
 pub use assets::Assets;
-pub use build::{build, check_materials};
+pub use build::{build, check_materials, light_names};
 
 /// A material's place in its scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -25,6 +25,13 @@ pub struct MaterialId(u32);
 /// A light's place in its scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct LightId(u32);
+
+impl LightId {
+    /// The light's place among [`Scene::lights`].
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+}
 
 /// What a shape is made of.
 #[derive(Clone, Copy, Debug)]
@@ -41,6 +48,8 @@ pub struct Scene<C: ColorModel> {
     materials: Vec<Material<C>>,
     lights: Vec<Light<C>>,
     choice: Choice,
+    /// Never chosen, for they are nowhere.
+    ambients: Vec<Light<C>>,
     environment: Option<LightId>,
     /// By shape.
     surfacing: Vec<Surfacing>,
@@ -59,7 +68,22 @@ impl<C: ColorModel> Scene<C> {
 
     /// How many lights there are.
     pub fn light_count(&self) -> usize {
-        self.lights.len()
+        self.lights.len() + self.ambients.len()
+    }
+
+    /// The lights that are somewhere, as [`light_names`] names them.
+    pub fn lights(&self) -> &[Light<C>] {
+        &self.lights
+    }
+
+    /// The light all around, if there is one.
+    pub fn environment(&self) -> Option<LightId> {
+        self.environment
+    }
+
+    /// The light that the surface at a point is.
+    pub fn light_at(&self, at: &Interaction<'_>) -> Option<LightId> {
+        self.surfacing[at.shape as usize].light
     }
 
     /// Whether there is light all around.
@@ -121,7 +145,7 @@ impl<C: ColorModel> Scene<C> {
         from: Vec3,
         w: &C::Wavelengths,
     ) -> Option<(C::Sample, f32)> {
-        let id = self.surfacing[at.shape as usize].light?;
+        let id = self.light_at(at)?;
         let light = self.light(id);
         let radiance = light.surface_radiance(at, w);
         (!radiance.is_black()).then(|| {
@@ -139,5 +163,12 @@ impl<C: ColorModel> Scene<C> {
             let pdf = light.environment_pdf(direction) * self.choice.probability(id);
             (radiance, pdf)
         })
+    }
+
+    /// What the surface at `at` returns of ambient light toward `at.wi`; `None` in a scene without any.
+    pub fn ambient(&self, at: &Interaction<'_>, w: &C::Wavelengths) -> Option<C::Sample> {
+        let brought = self.ambients.iter().map(|light| light.ambient_radiance(w));
+        let radiance = brought.reduce(|a, b| a + b)?;
+        Some(radiance * self.material(at).ambient(at, at.wi, w))
     }
 }

@@ -1,32 +1,38 @@
 //! Shapes: what a scene's `<shape>` plugins build. Most build a triangle mesh, some a surface with an
 //! equation of its own; everything above sees a [`Geometry`].
 
-mod cylinder;
 mod disk;
+mod frustum;
 mod mesh;
+mod plane;
 mod quad;
 mod sphere;
 
+mod cone;
 mod cube;
+mod cylinder;
 mod gltf;
 mod obj;
 mod ply;
+mod polygon;
 mod rectangle;
 mod serialized;
 mod stl;
+mod triangle;
 
-use glam::{DMat4, Vec2, Vec3};
+use glam::{DAffine3, DMat3, DMat4, DVec3, Vec2, Vec3};
 
 use crate::description::{Kind, Properties};
 use crate::error::{Problem, Result};
 use crate::family;
 use crate::interaction::{Hit, Interaction, Ray};
-use crate::math::Transform;
+use crate::math::{Transform, offset};
 use crate::mesh::Mesh;
 
-pub use cylinder::Cylinder;
 pub use disk::Disk;
+pub use frustum::Frustum;
 pub use mesh::TriangleMesh;
+pub use plane::Plane;
 pub use sphere::Sphere;
 
 /// An axis-aligned box.
@@ -43,6 +49,12 @@ impl Bounds {
     pub const EMPTY: Self = Self {
         min: Vec3::INFINITY,
         max: Vec3::NEG_INFINITY,
+    };
+
+    /// Contains every point.
+    pub const EVERYTHING: Self = Self {
+        min: Vec3::NEG_INFINITY,
+        max: Vec3::INFINITY,
     };
 
     /// The smallest box around both.
@@ -85,6 +97,12 @@ impl Bounds {
     pub fn is_empty(&self) -> bool {
         !self.min.cmple(self.max).all()
     }
+
+    /// Whether it contains something and has no end.
+    pub fn is_unbounded(&self) -> bool {
+        let has_end = self.min.is_finite() && self.max.is_finite();
+        !(has_end || self.is_empty())
+    }
 }
 
 /// A point drawn on a surface as seen from another point.
@@ -118,13 +136,13 @@ pub struct Chart {
 pub trait Surface: std::fmt::Debug + Send + Sync {
     /// How many primitives it has.
     fn primitive_count(&self) -> u32;
-    /// A box that contains a primitive's every hit.
+    /// A box that contains a primitive's every hit; it may be without an end.
     fn bounds(&self, primitive: u32) -> Bounds;
     /// (t, u, v) of a primitive's first hit with 0 < t ≤ `t_max`.
     fn intersect(&self, primitive: u32, ray: &Ray) -> Option<(f32, f32, f32)>;
     /// What a hit looks like; `hit` came from this surface and `ray`.
     fn interaction(&self, ray: &Ray, hit: &Hit) -> Interaction<'_>;
-    /// In square units of the scene.
+    /// In square units of the scene; may be infinite.
     fn area(&self) -> f64;
     /// A point drawn on the surface for light at `from`; `None` where none can be.
     fn sample(&self, from: Vec3, u: Vec2) -> Option<SurfaceSample>;
@@ -148,10 +166,12 @@ pub trait Surface: std::fmt::Debug + Send + Sync {
 pub enum Geometry {
     /// Triangles.
     Mesh(TriangleMesh),
-    /// A cylinder without caps.
-    Cylinder(Cylinder),
     /// A disk.
     Disk(Disk),
+    /// A cylinder or a cone.
+    Frustum(Frustum),
+    /// A plane without an end.
+    Plane(Plane),
     /// A sphere.
     Sphere(Sphere),
 }
@@ -172,8 +192,9 @@ impl std::ops::Deref for Geometry {
     fn deref(&self) -> &Self::Target {
         match self {
             Self::Mesh(mesh) => mesh,
-            Self::Cylinder(cylinder) => cylinder,
             Self::Disk(disk) => disk,
+            Self::Frustum(frustum) => frustum,
+            Self::Plane(plane) => plane,
             Self::Sphere(sphere) => sphere,
         }
     }
@@ -197,20 +218,25 @@ impl From<Geometry> for Shape {
     }
 }
 
-type Build = fn(&Properties<'_>) -> Result<Shape>;
+/// What builds a shape that stands in groups whose transforms make up the matrix.
+type Build = fn(&Properties<'_>, &DMat4) -> Result<Shape>;
 
 /// The shape plugins.
 const PLUGINS: &[(&str, Build)] = &[
+    ("cone", cone::build),
     ("cube", cube::build),
     ("cylinder", cylinder::build),
     ("disk", disk::build),
     ("gltf", gltf::build),
     ("obj", obj::build),
+    ("plane", plane::build),
     ("ply", ply::build),
+    ("polygon", polygon::build),
     ("rectangle", rectangle::build),
     ("serialized", serialized::build),
     ("sphere", sphere::build),
     ("stl", stl::build),
+    ("triangle", triangle::build),
 ];
 
 /// Shapes made of shapes, which the scene puts together: several in a space of their own, and those once
@@ -218,21 +244,28 @@ const PLUGINS: &[(&str, Build)] = &[
 pub const GROUP: &str = "shapegroup";
 /// See [`GROUP`].
 pub const INSTANCE: &str = "instance";
+/// A node of a scene graph: shapes that share its transform and its material.
+pub const NODE: &str = "group";
 
 /// The names of the plugins, as scene files write them.
 pub fn names() -> Vec<&'static str> {
     let single = PLUGINS.iter().map(|(name, _)| *name);
-    single.chain([GROUP, INSTANCE]).collect()
+    single.chain([GROUP, INSTANCE, NODE]).collect()
 }
 
 /// Builds the shape that `properties` names.
 pub fn build(properties: &Properties<'_>) -> Result<Shape> {
+    build_within(&DMat4::IDENTITY, properties)
+}
+
+/// Builds the shape that `properties` names, in a space from which `outer` leads to the world's.
+pub fn build_within(outer: &DMat4, properties: &Properties<'_>) -> Result<Shape> {
     debug_assert_eq!(properties.kind(), Kind::Shape);
     match PLUGINS
         .iter()
         .find(|(name, _)| *name == properties.plugin())
     {
-        Some((_, build)) => build(properties),
+        Some((_, build)) => build(properties, outer),
         None => Err(family::unknown(
             properties,
             "shape",
@@ -242,9 +275,22 @@ pub fn build(properties: &Properties<'_>) -> Result<Shape> {
     }
 }
 
-/// The property `to_world`, the identity by default.
-fn to_world(properties: &Properties<'_>) -> Result<DMat4> {
-    Ok(properties.transform("to_world")?.unwrap_or(DMat4::IDENTITY))
+/// The property `to_world`, the identity by default, and then `outer`.
+fn to_world(properties: &Properties<'_>, outer: &DMat4) -> Result<DMat4> {
+    let own = properties.transform("to_world")?;
+    Ok(own.map_or(*outer, |own| *outer * own))
+}
+
+/// A bound, for each axis, on the error of a world position that was computed in double precision from the
+/// `local` one and then rounded: half a unit in the last place, and what the transforms there and back can have lost,
+/// which is all that is left where `position` is near 0.
+fn rounding(to_world: &DAffine3, local: DVec3, position: DVec3) -> Vec3 {
+    // Some thousand roundings of double precision; those of single precision are 10⁴ times larger.
+    const DOUBLE: f64 = 1e3 * f64::EPSILON;
+    let m = to_world.matrix3;
+    let spread = DMat3::from_cols(m.x_axis.abs(), m.y_axis.abs(), m.z_axis.abs());
+    let reach = spread * local.abs() + to_world.translation.abs();
+    (position.abs() * f64::from(offset::gamma(2)) + reach * DOUBLE).as_vec3()
 }
 
 /// Density per solid angle of a point drawn with density 1/`area` over a surface.

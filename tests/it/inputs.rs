@@ -168,6 +168,21 @@ const CASES: &[Case] = &[
         &["max_depth must be at least -1"],
     ),
     wrong(
+        "a falloff that is none",
+        r#"<integrator type="phong"><string name="falloff" value="inverse_sqare"/><!--!--></integrator>"#,
+        &["did you mean \"inverse_square\"?"],
+    ),
+    wrong(
+        "layers by something else",
+        r#"<integrator type="phong"><string name="layers" value="terms, light"/><!--!--></integrator>"#,
+        &["no layers by \"light\"", "did you mean \"lights\"?"],
+    ),
+    wrong(
+        "a highlight with a negative exponent",
+        r#"<shape type="sphere"><bsdf type="phong"><float name="exponent" value="-3"/><!--!--></bsdf></shape>"#,
+        &["an exponent must be at least 0, and -3 is not"],
+    ),
+    wrong(
         "a boolean that is neither",
         r#"<shape type="sphere"><boolean name="flip_normals" value="maybe"/><!--!--></shape>"#,
         &["maybe"],

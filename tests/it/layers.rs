@@ -12,7 +12,9 @@ const LAYERS: &[&[&str]] = &[
     &["color"],
     &["description", "image", "mesh"],
     &["family", "interaction"],
-    &["display", "filter", "sampler", "shape", "texture"],
+    &[
+        "compare", "display", "filter", "relight", "sampler", "shape", "texture",
+    ],
     &["sensor"],
     &["accel", "light", "material"],
     &["scene"],

@@ -1,0 +1,303 @@
+//! `etendue compare`: whether images agree, by metrics, by seeds or against a reference of known variance.
+
+mod known;
+mod sides;
+mod two;
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use etendue::compare::map::Map;
+use etendue::compare::metric::Metric;
+use etendue::compare::pair;
+use etendue::compare::{Crop, Layer, Selection, flip};
+use etendue::error::{Error, Result};
+use etendue::image;
+use etendue::sensor::Window;
+use serde_json::{Value, json};
+
+use super::{output, parse, report, status};
+
+/// Find out whether images agree
+///
+/// Two images are measured with every metric, A being the reference. They agree if they are equal or, where
+/// limits are given, if they keep within them. Metrics cannot tell noise from error: for renders give
+/// several seeds a side (--a, --b), and a statistical test tells, or one image and a reference of known
+/// variance (--reference, --variance).
+#[derive(Args, Debug)]
+#[command(after_help = HELP, after_long_help = LONG_HELP)]
+pub(super) struct Arguments {
+    /// Two images, the reference first (EXR, HDR, PNG, JPEG, BMP, TGA); with --reference only one
+    #[arg(value_name = "IMAGE", num_args = 1..=2, required_unless_present = "a", conflicts_with = "a")]
+    images: Vec<PathBuf>,
+    /// Compare the channels NAME.* or the one channel NAME, not the main colour
+    #[arg(long, value_name = "NAME")]
+    layer: Option<String>,
+    /// Compare a window of pixels
+    #[arg(long, value_name = "X,Y,WIDTH,HEIGHT", value_parser = parse::crop)]
+    crop: Option<Window>,
+
+    /// Differ only if the metric is above the value; may be given several times
+    #[arg(long, value_name = "METRIC=VALUE", value_parser = limit, conflicts_with = "a", help_heading = PAIR)]
+    fail_above: Vec<Limit>,
+    /// Differ only if the metric (psnr, ssim) is below the value; may be given several times
+    #[arg(long, value_name = "METRIC=VALUE", value_parser = limit, conflicts_with = "a", help_heading = PAIR)]
+    fail_below: Vec<Limit>,
+    /// The greatest value meant to occur: PSNR's peak, SSIM's range
+    #[arg(long, value_name = "VALUE", default_value_t = 1.0, value_parser = positive, help_heading = PAIR)]
+    peak: f64,
+    /// Pixels in a degree of the visual field, for FLIP
+    #[arg(long, value_name = "N", default_value_t = flip::PIXELS_PER_DEGREE,
+        value_parser = pixels_per_degree, help_heading = PAIR)]
+    ppd: f32,
+
+    /// Side A: renders of one scene with different seeds, at least two
+    #[arg(long, value_name = "IMAGE", num_args = 1.., requires = "b", help_heading = SEEDS)]
+    a: Vec<PathBuf>,
+    /// Side B
+    #[arg(long, value_name = "IMAGE", num_args = 1.., requires = "a", help_heading = SEEDS)]
+    b: Vec<PathBuf>,
+    /// The probability that two sides of one image are found to agree
+    #[arg(long, value_name = "P", default_value_t = 0.99, value_parser = probability, help_heading = SEEDS)]
+    confidence: f64,
+    /// Refuse to compare (status 2) where a relative difference of the mean below this could hide in noise
+    #[arg(long, value_name = "PART", value_parser = positive, requires = "a", help_heading = SEEDS)]
+    precision: Option<f64>,
+
+    /// The reference's mean
+    #[arg(long, value_name = "IMAGE", requires_all = ["variance", "spp"], conflicts_with_all = ["a", "fail_above", "fail_below"], help_heading = KNOWN)]
+    reference: Option<PathBuf>,
+    /// The variance of one of its samples a pixel
+    #[arg(long, value_name = "IMAGE", requires = "reference", help_heading = KNOWN)]
+    variance: Option<PathBuf>,
+    /// Samples a pixel of the image
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), requires = "reference", help_heading = KNOWN)]
+    spp: Option<u32>,
+    /// Samples a pixel of the reference
+    #[arg(long, value_name = "N", default_value_t = 32_000, value_parser = clap::value_parser!(u32).range(1..), help_heading = KNOWN)]
+    reference_spp: u32,
+
+    /// Draw where they differ, with a legend, as PNG: FLIP (of colours) or |b − a|, |t| between seeds, |z|
+    /// against a reference
+    #[arg(long, value_name = "PNG", help_heading = TELL)]
+    map: Option<PathBuf>,
+    /// What the map of two images shows
+    #[arg(long, value_enum, requires = "map", conflicts_with_all = ["a", "reference"], help_heading = TELL)]
+    map_of: Option<MapOf>,
+    /// Print a JSON object
+    #[arg(long, help_heading = TELL)]
+    json: bool,
+    /// Print nothing but what is wrong
+    #[arg(short, long, help_heading = TELL)]
+    quiet: bool,
+}
+
+const PAIR: &str = "Two images";
+const SEEDS: &str = "Several seeds a side";
+const KNOWN: &str = "A reference of known variance";
+const TELL: &str = "What is told";
+
+const HELP: &str = "Exit status: 0 the images agree; 1 they differ; 2 they cannot be compared, or the command \
+line is wrong.";
+
+const LONG_HELP: &str = "\
+Metrics, d = b - a, over all pixels and channels:
+  bias      greatest |mean d| of a channel      mape      mean |d| / (|a| + 0.01)
+  max       greatest |d|                        smape     mean 2|d| / (|a| + |b| + 0.01)
+  mae       mean |d|                            psnr      10 log10(peak^2 / mse)
+  mse       mean d^2                            ssim      scikit-image's, 7 x 7 windows
+  rmse      square root of mse                  flip_ldr  mean FLIP of what a screen shows
+  relmse    mean d^2 / (a^2 + 0.01)             flip_hdr  mean FLIP over exposures
+Values of EXR and HDR are taken as they are, those of PNG as codes from 0 to 1; of one beside the \
+other the linear ones are encoded. NaN and infinite values cannot be compared; the message counts them.
+
+Between seeds, Welch's test holds the means of the image, of tiles of 16 x 16 pixels and of single \
+pixels against each other, with correction for the number of tests. The errors are those between \
+seeds, never those of pixels: a filter that splats samples into several pixels makes neighbours vary \
+together.
+
+Examples:
+  etendue compare reference.exr image.exr --fail-above relmse=0.01 --map map.png
+  etendue compare image.exr other.exr --layer albedo --crop 0,0,64,64 --json
+  etendue compare --a a1.exr a2.exr a3.exr a4.exr --b b1.exr b2.exr b3.exr b4.exr
+  etendue compare image.exr --reference mean.exr --variance variance.exr --spp 256
+
+Exit status: 0 the images agree; 1 they differ; 2 they cannot be compared, or the command line is wrong.";
+
+/// What a map of two images shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum MapOf {
+    /// FLIP, over exposures where values are linear
+    Flip,
+    /// |b - a|, the greatest over channels
+    Difference,
+    /// |b - a| / (|a| + 0.01), the greatest over channels
+    Relative,
+}
+
+/// A bound on a metric.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Limit {
+    metric: Metric,
+    value: f64,
+}
+
+fn limit(text: &str) -> std::result::Result<Limit, String> {
+    let (name, value) = text
+        .split_once('=')
+        .ok_or("write it as METRIC=VALUE, such as relmse=0.01")?;
+    let metric = Metric::of_name(name).ok_or_else(|| {
+        let names: Vec<&str> = Metric::ALL.iter().map(|m| m.name()).collect();
+        format!(
+            "there is no metric {name:?}; there are {}",
+            names.join(", ")
+        )
+    })?;
+    let value: f64 = value
+        .parse()
+        .map_err(|_| format!("{value:?} is not a number"))?;
+    if value.is_nan() {
+        return Err("nothing is above or below NaN".to_owned());
+    }
+    Ok(Limit { metric, value })
+}
+
+fn positive(text: &str) -> std::result::Result<f64, String> {
+    let value: f64 = text.parse().map_err(|_| "write a number")?;
+    if value > 0.0 && value.is_finite() {
+        Ok(value)
+    } else {
+        Err("it must be positive".to_owned())
+    }
+}
+
+fn pixels_per_degree(text: &str) -> std::result::Result<f32, String> {
+    Ok(positive(text)? as f32)
+}
+
+fn probability(text: &str) -> std::result::Result<f64, String> {
+    let value: f64 = text.parse().map_err(|_| "write a number")?;
+    if value > 0.0 && value < 1.0 {
+        Ok(value)
+    } else {
+        Err("it must lie between 0 and 1".to_owned())
+    }
+}
+
+/// What a comparison comes to.
+struct Outcome {
+    agrees: bool,
+    /// In words.
+    sentence: String,
+    /// Lines for people.
+    lines: Vec<String>,
+    /// For programs.
+    object: Value,
+}
+
+/// Runs the command; the answer is the exit status.
+pub(super) fn run(arguments: &Arguments) -> Result<u8> {
+    let outcome = match compare(arguments) {
+        Ok(outcome) => outcome,
+        Err(error) => {
+            if arguments.json {
+                let problems = report::json(error.problems());
+                output::line(
+                    &json!({ "verdict": "cannot compare", "problems": problems }).to_string(),
+                );
+            } else {
+                report::error(&error);
+            }
+            return Ok(status::CANNOT_COMPARE);
+        }
+    };
+    if arguments.json {
+        let mut object = outcome.object;
+        object["verdict"] = if outcome.agrees { "agree" } else { "differ" }.into();
+        object["sentence"] = outcome.sentence.into();
+        output::line(&object.to_string());
+    } else if !arguments.quiet {
+        outcome.lines.iter().for_each(|line| output::line(line));
+        output::line(&outcome.sentence);
+    }
+    Ok(if outcome.agrees {
+        status::DONE
+    } else {
+        status::DIFFERS
+    })
+}
+
+fn compare(arguments: &Arguments) -> Result<Outcome> {
+    if let Some(map) = &arguments.map {
+        image::check_writable(map)?;
+    }
+    match (&arguments.reference, &arguments.images[..]) {
+        (Some(reference), [image]) => known::against_reference(arguments, image, reference),
+        (None, [a, b]) => two::two(arguments, a, b),
+        (None, []) => sides::sides(arguments),
+        (Some(_), _) => Err(Error::input("one image is held against a reference")),
+        (None, _) => Err(
+            Error::input("there is one image, and nothing to hold it against")
+                .help("give two images, or --reference, --variance and --spp"),
+        ),
+    }
+}
+
+impl Arguments {
+    fn selection(&self) -> Selection {
+        Selection {
+            layer: self.layer.clone(),
+            crop: self.crop.map(
+                |Window {
+                     x,
+                     y,
+                     width,
+                     height,
+                 }| Crop {
+                    x,
+                    y,
+                    width,
+                    height,
+                },
+            ),
+        }
+    }
+
+    fn draw(&self, layer: &Layer, values: &[f32], label: &str, top: f32) -> Result<()> {
+        let Some(path) = &self.map else {
+            return Ok(());
+        };
+        let width = layer.image.width() as usize;
+        let map = Map {
+            width,
+            values,
+            label,
+            top,
+        };
+        image::write_codes(path, &map.draw()?)
+    }
+}
+
+/// The brightest |t| and |z| on a map: chance alone rarely reaches it.
+const T_TOP: f32 = 6.0;
+
+/// What is compared, for people.
+fn head(layer: &Layer, paths: &[(&Path, &str)]) -> Vec<String> {
+    let mut lines: Vec<String> = paths
+        .iter()
+        .map(|(path, side)| format!("{side:2} {}", path.display()))
+        .collect();
+    let image = &layer.image;
+    let mut what = format!(
+        "   {} × {} pixels; {}; {}",
+        image.width(),
+        image.height(),
+        image.channels().join(", "),
+        pair::kind_of_values(layer.encoding)
+    );
+    if !layer.others.is_empty() {
+        what += &format!("; not compared: {}", layer.others.join(", "));
+    }
+    lines.push(what);
+    lines
+}

@@ -1,0 +1,45 @@
+//! One image against a reference of known variance.
+
+use std::path::Path;
+
+use etendue::compare::Layer;
+use etendue::compare::ztest::{self, Reference};
+use etendue::error::{Error, Result};
+
+use super::{Arguments, Outcome, T_TOP};
+
+pub(super) fn against_reference(
+    arguments: &Arguments,
+    path: &Path,
+    reference: &Path,
+) -> Result<Outcome> {
+    let (Some(variance), Some(spp)) = (&arguments.variance, arguments.spp) else {
+        return Err(Error::input("a reference needs --variance and --spp"));
+    };
+    let selection = arguments.selection();
+    let layer = Layer::read(path, &selection)?;
+    let mean = Layer::read(reference, &selection)?;
+    let variance = Layer::read(variance, &selection)?;
+    let reference = Reference {
+        mean: &mean,
+        variance: &variance,
+        spp: arguments.reference_spp,
+    };
+    let outcome = ztest::ztest(&layer, spp, &reference)?;
+    arguments.draw(&layer, &outcome.map, "|z|", T_TOP)?;
+    let lines = vec![format!(
+        "  accepted {:.5}, gain {:+.5} ± {:.5}, z rms {:.3}, greatest {:.2} (bound {:.2})",
+        outcome.accepted,
+        outcome.gain,
+        outcome.gain_error,
+        outcome.z_rms,
+        outcome.z_max,
+        outcome.z_bound
+    )];
+    Ok(Outcome {
+        agrees: outcome.passed,
+        sentence: outcome.sentence(),
+        lines,
+        object: serde_json::to_value(&outcome).expect("it has only names and numbers"),
+    })
+}

@@ -1,0 +1,275 @@
+//! `etendue crosscheck`: scenes on both sides, here and in Mitsuba, and whether the images agree.
+
+use std::path::{Component, Path, PathBuf};
+use std::time::Duration;
+
+use clap::Args;
+use etendue::crosscheck::{self, Settings, Side, Watch};
+use etendue::error::{Error, Result};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+use super::stop::Stop;
+use super::verdicts::{self, Ending, Style};
+use super::{parse, report, status};
+
+/// Render scenes here and in Mitsuba, and say whether the images agree
+///
+/// Each side renders each scene with several seeds. How much the seeds of a side differ is the yardstick:
+/// the images differ where the means over the seeds, of the whole, of tiles or of pixels, are further apart
+/// than chance explains, by Welch's test at 1 % for the scene. The interval around the bias says how small
+/// a difference would have been found.
+///
+/// Each side is a process that loads the scene once and renders the seeds in turns with the other. Seconds
+/// are the median of a seed's, without starting and loading; ratios are medians over pairs of seeds.
+///
+/// Mitsuba is driven through Python: that of --python, else of $ETENDUE_PYTHON, else of the environment that
+/// `tools/venv` makes, else python3. A scene that asks for what one side lacks is told as not comparable.
+#[derive(Args, Debug)]
+#[command(after_help = HELP)]
+pub(super) struct Arguments {
+    /// Scene files (.xml)
+    #[arg(required = true, value_name = "SCENE")]
+    scenes: Vec<PathBuf>,
+    /// Value of a $name parameter of the scenes
+    #[arg(short = 'D', value_name = "NAME=VALUE", value_parser = parse::define)]
+    define: Vec<(String, String)>,
+    /// Let Mitsuba render this scene instead: the same in words that Mitsuba knows
+    #[arg(long, value_name = "SCENE")]
+    reference: Option<PathBuf>,
+
+    /// How often each side renders a scene
+    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(2..=100_000))]
+    seeds: u32,
+    /// The first seed; the others follow it
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(..1 << 31))]
+    seed: u64,
+    /// Samples a pixel and seed, in place of the scene's sample_count
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    spp: Option<u32>,
+    /// Size of the film in pixels
+    #[arg(long, value_name = "WxH", value_parser = parse::size)]
+    size: Option<(u32, u32)>,
+    /// The integrator's max_depth
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    max_depth: Option<i64>,
+    /// Render N spectral bands here; Mitsuba's variant is scalar_spectral then
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=32))]
+    bands: Option<u8>,
+
+    /// Mitsuba's variant; with a spectral one, 8 bands are rendered here [default: scalar_rgb]
+    #[arg(long, value_name = "NAME")]
+    variant: Option<String>,
+    /// The Python that has Mitsuba
+    #[arg(long, value_name = "PATH")]
+    python: Option<PathBuf>,
+    /// A folder of Python files that register plugins with Mitsuba; by default tools/mitsuba where it is there
+    #[arg(long, value_name = "DIR")]
+    plugins: Option<PathBuf>,
+    /// Threads of each side; one a processor by default
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
+    threads: Option<u32>,
+    /// The longest that a side may take to load a scene, and to render a seed
+    #[arg(long, value_name = "SECONDS", default_value = "300", value_parser = parse::seconds)]
+    timeout: Duration,
+
+    /// Where the images agree and the interval around the bias is wider than ± this part of the mean, they
+    /// are too noisy to say
+    #[arg(long, value_name = "PART", default_value = "0.05", value_parser = parse::positive)]
+    precision: f64,
+    /// Do not judge the images, compare the times
+    #[arg(long)]
+    timing_only: bool,
+    /// Keep both sides' mean images and a map of the error, in a folder of DIR for each scene
+    #[arg(long, value_name = "DIR", conflicts_with = "timing_only")]
+    keep: Option<PathBuf>,
+    /// Print a JSON object for each scene
+    #[arg(long)]
+    json: bool,
+    /// No progress bar, no paragraph on scenes that agree
+    #[arg(short, long)]
+    quiet: bool,
+}
+
+const HELP: &str = "\
+Examples:
+  etendue crosscheck scenes/*.xml --size 96x96 --spp 64
+  etendue crosscheck scene.xml --seeds 16 --precision 0.002 --keep out
+  etendue crosscheck scene.xml --variant llvm_ad_rgb --timing-only --json
+
+Exit status: 0 done; all scenes agree; 1 one differs; 2 none differs and one could not be compared or was \
+too noisy to say, Mitsuba is not there, or the command line is wrong; 3 the system refused; 130 stopped by \
+Ctrl-C, SIGTERM or SIGHUP.";
+
+/// Where Mitsuba's plugins for what it lacks are kept in a checkout.
+const PLUGINS: &str = "tools/mitsuba";
+
+impl Arguments {
+    fn settings(&self) -> Result<Settings> {
+        let executable = std::env::current_exe()
+            .map_err(|e| Error::input(format!("cannot find this program's own file: {e}")))?;
+        let spectral = |variant: &String| variant.contains("spectral");
+        let bands = self
+            .bands
+            .or_else(|| self.variant.as_ref().filter(|v| spectral(v)).map(|_| 8));
+        let variant = match (&self.variant, bands) {
+            (Some(variant), _) => variant.clone(),
+            (None, Some(_)) => "scalar_spectral".to_owned(),
+            (None, None) => "scalar_rgb".to_owned(),
+        };
+        if bands.is_some() && !spectral(&variant) {
+            let message = format!("--bands has no like in Mitsuba's variant {variant:?}");
+            return Err(Error::input(message).help("take one such as scalar_spectral"));
+        }
+        if self.reference.is_some() && self.scenes.len() > 1 {
+            let message = "--reference is another form of one scene, and there are several";
+            return Err(Error::input(message));
+        }
+        let plugins = self.plugins.clone();
+        if let Some(folder) = plugins.as_ref().filter(|folder| !folder.is_dir()) {
+            return Err(Error::input(format!("{} is no folder", folder.display())));
+        }
+        let usual = Path::new(PLUGINS);
+        Ok(Settings {
+            python: crosscheck::find_python(self.python.as_deref(), &executable)?,
+            etendue: (executable, vec![super::CROSSCHECK_WORKER.to_owned()]),
+            plugins: plugins.or_else(|| usual.is_dir().then(|| usual.to_owned())),
+            variant,
+            bands,
+            reference: self.reference.clone(),
+            defines: self.define.clone(),
+            size: self.size,
+            spp: self.spp,
+            max_depth: self.max_depth,
+            seeds: self.seeds,
+            first_seed: self.seed,
+            threads: self.threads,
+            timeout: self.timeout,
+            keep: None,
+            timing_only: self.timing_only,
+        })
+    }
+}
+
+/// Runs the command; the answer is the exit status.
+pub(super) fn run(arguments: &Arguments) -> Result<u8> {
+    let folders = folders(&arguments.scenes);
+    let mut settings = match arguments.settings() {
+        Ok(settings) => settings,
+        Err(error) => {
+            report::error(&error);
+            return Ok(status::CANNOT_COMPARE);
+        }
+    };
+    let style = Style {
+        quiet: arguments.quiet,
+        json: arguments.json,
+        precision: arguments.precision,
+    };
+    let stop = Stop::on_signals()?;
+    let mut endings = Vec::new();
+    for (i, scene) in arguments.scenes.iter().enumerate() {
+        settings.keep = arguments
+            .keep
+            .as_ref()
+            .map(|folder| folder.join(&folders[i]));
+        let name = scene.display().to_string();
+        let bar = Bar::new(&name, arguments.quiet, &stop);
+        let result = crosscheck::crosscheck(scene, &settings, &bar);
+        bar.bar.finish_and_clear();
+        let ending = Ending::of(result, style);
+        verdicts::tell(style, &name, &ending);
+        let hopeless = ending.is_hopeless() || stop.signalled();
+        endings.push((name, ending));
+        if hopeless {
+            break;
+        }
+    }
+    if endings.len() > 1 {
+        verdicts::table(style, &endings);
+    }
+    Ok(if stop.signalled() {
+        status::INTERRUPTED
+    } else {
+        verdicts::status(&endings)
+    })
+}
+
+/// What the scenes' folders are called: by their file names, or whole paths where names are shared.
+fn folders(scenes: &[PathBuf]) -> Vec<String> {
+    let stem = |scene: &PathBuf| {
+        scene
+            .file_stem()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned()
+    };
+    let stems: Vec<String> = scenes.iter().map(stem).collect();
+    let path = |scene: &PathBuf| {
+        let parts = scene.components().filter_map(|part| match part {
+            Component::Normal(name) => Some(name.to_string_lossy().into_owned()),
+            _ => None,
+        });
+        parts.collect::<Vec<_>>().join("-")
+    };
+    let shared = |name: &String| stems.iter().filter(|other| *other == name).count() > 1;
+    let named = scenes.iter().zip(&stems);
+    named
+        .map(|(scene, stem)| {
+            if shared(stem) {
+                path(scene)
+            } else {
+                stem.clone()
+            }
+        })
+        .collect()
+}
+
+/// Serves as Étendue's side: see [`crosscheck::serve`].
+pub(super) fn serve() -> Result<u8> {
+    crosscheck::serve(std::io::stdin().lock(), std::io::stdout().lock())?;
+    Ok(status::DONE)
+}
+
+/// A progress bar over the images of a scene.
+struct Bar<'a> {
+    bar: ProgressBar,
+    stop: &'a Stop,
+}
+
+impl<'a> Bar<'a> {
+    fn new(name: &str, quiet: bool, stop: &'a Stop) -> Self {
+        let target = if quiet {
+            ProgressDrawTarget::hidden()
+        } else {
+            ProgressDrawTarget::stderr_with_hz(5)
+        };
+        let bar = ProgressBar::with_draw_target(Some(0), target);
+        let template = "{prefix} [{bar:30}] {pos}/{len} images, {msg}";
+        bar.set_style(ProgressStyle::with_template(template).expect("the template is right"));
+        bar.set_prefix(name.to_owned());
+        Self { bar, stop }
+    }
+}
+
+impl Watch for Bar<'_> {
+    fn at(&self, side: Side, done: u32, total: u32) {
+        self.bar.set_length(total.into());
+        self.bar.set_position(done.into());
+        self.bar.set_message(format!("{side} at work"));
+    }
+
+    fn stop(&self) -> bool {
+        self.stop.asked()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn scenes_of_one_name_are_kept_apart() {
+        let scenes = ["a/scene.xml", "../b/scene.xml", "c/box.xml"].map(PathBuf::from);
+        assert_eq!(folders(&scenes), ["a-scene.xml", "b-scene.xml", "box"]);
+    }
+}

@@ -1,0 +1,118 @@
+//! The images of both sides: judged as they come, so that a thousand seeds take the memory of one, and kept
+//! as means where somebody wants to look at them.
+
+use std::path::Path;
+
+use super::Failure;
+use crate::compare::map::{Map, robust_top};
+use crate::compare::seeds::{self, Verdict};
+use crate::compare::{Layer, Selection};
+use crate::display;
+use crate::error::Error;
+use crate::image::{self, Image, Limits, Metadata};
+
+/// The probability that two sides of one image are found to agree.
+const CONFIDENCE: f64 = 0.99;
+
+/// Reads the main colour of a render.
+pub(super) fn read(path: &Path) -> Result<Layer, Failure> {
+    let picture = image::read(path, &Limits::default())?;
+    Layer::of(&picture, &Selection::default()).map_err(not_comparable)
+}
+
+fn not_comparable(error: Error) -> Failure {
+    Failure::NotComparable(error.to_string())
+}
+
+/// The images of both sides so far; the reference comes first.
+#[derive(Debug, Default)]
+pub(super) struct Images {
+    sides: Option<[seeds::Side; 2]>,
+    means: [Mean; 2],
+}
+
+impl Images {
+    /// Takes a pair.
+    pub(super) fn push(&mut self, mut reference: Layer, mut ours: Layer) -> Result<(), Failure> {
+        Layer::align(&mut reference, &mut ours).map_err(not_comparable)?;
+        let sides = match &mut self.sides {
+            Some(sides) => sides,
+            none => none.insert([
+                seeds::Side::new(&reference.image, reference.rgb)?,
+                seeds::Side::new(&ours.image, ours.rgb)?,
+            ]),
+        };
+        for (i, (layer, name)) in [(&reference, "Mitsuba"), (&ours, "Étendue")]
+            .into_iter()
+            .enumerate()
+        {
+            sides[i]
+                .push(&layer.image)
+                .map_err(|e| Failure::Broken(format!("{name}'s image: {e}")))?;
+            self.means[i].push(&layer.image);
+        }
+        Ok(())
+    }
+
+    /// Pixels across and down.
+    pub(super) fn size(&self) -> [u32; 2] {
+        let mean = self.means[0].image.as_ref();
+        mean.map_or([0; 2], |image| [image.width(), image.height()])
+    }
+
+    /// Holds the sides against each other.
+    pub(super) fn judge(&self) -> Result<Verdict, Failure> {
+        let [reference, ours] = self.sides()?;
+        Ok(seeds::judge(reference, ours, CONFIDENCE)?)
+    }
+
+    /// Writes the mean images `mitsuba.exr` and `etendue.exr`, and `error.png`, a map of how many standard
+    /// errors they are apart, into a folder that is there.
+    pub(super) fn keep(&self, folder: &Path) -> Result<(), Failure> {
+        for (mean, name) in self.means.iter().zip(["mitsuba.exr", "etendue.exr"]) {
+            if let Some(image) = &mean.image {
+                display::save(&folder.join(name), image, &Metadata::default())?;
+            }
+        }
+        let [reference, ours] = self.sides()?;
+        let values = seeds::map(reference, ours)?;
+        let map = Map {
+            width: self.size()[0] as usize,
+            values: &values,
+            label: "|difference| in standard errors",
+            top: robust_top(&values),
+        };
+        image::write_codes(&folder.join("error.png"), &map.draw()?)?;
+        Ok(())
+    }
+
+    fn sides(&self) -> Result<&[seeds::Side; 2], Failure> {
+        let none = || Failure::Broken("there are no images to judge".to_owned());
+        self.sides.as_ref().ok_or_else(none)
+    }
+}
+
+/// The mean of images.
+#[derive(Debug, Default)]
+struct Mean {
+    image: Option<Image>,
+    sums: Vec<f64>,
+    count: usize,
+}
+
+impl Mean {
+    fn push(&mut self, image: &Image) {
+        let mean = self.image.get_or_insert_with(|| image.clone());
+        self.sums.resize(mean.data().len(), 0.0);
+        self.count += 1;
+        for ((mean, sum), value) in mean
+            .data_mut()
+            .iter_mut()
+            .zip(&mut self.sums)
+            .zip(image.data())
+        {
+            *sum += f64::from(*value);
+            *mean = (*sum / self.count as f64) as f32;
+        }
+    }
+}

@@ -1,0 +1,200 @@
+"""Mitsuba's side of `etendue crosscheck`: loads a scene and renders it once for each seed that it is told.
+
+The program starts this with an order, one line of JSON, on standard input, and then writes seeds, one a
+line. Each gets one line of JSON on standard output: {"loaded": …} or {"refused": …} for the order, and
+{"rendered": …} for a seed. The end of the input ends it. It needs nothing but the package `mitsuba`.
+"""
+import importlib.util
+import json
+import os
+import sys
+import time
+from pathlib import Path
+
+TAGS = {'ReconstructionFilter': 'rfilter', 'PhaseFunction': 'phase'}
+
+
+class Refused(Exception):
+    """The scene asks for what Mitsuba does not have."""
+
+
+class Clock:
+    """Seconds since it was made, of the wall and of all threads of this process."""
+
+    def __init__(self):
+        self.wall, self.cpu = time.perf_counter(), time.process_time()
+
+    def time(self):
+        return {'seconds': time.perf_counter() - self.wall, 'cpu': time.process_time() - self.cpu}
+
+
+def import_plugins(folder):
+    """Runs every Python file of a folder: each registers what it adds to Mitsuba."""
+    sys.path.insert(0, str(folder))
+    for path in sorted(Path(folder).glob('*.py')):
+        spec = importlib.util.spec_from_file_location(path.stem, path)
+        module = importlib.util.module_from_spec(spec)
+        sys.modules.setdefault(path.stem, module)
+        spec.loader.exec_module(module)
+
+
+class Parsed:
+    """A scene file as Mitsuba's parser leaves it, before anything is built. Nodes are known by number."""
+
+    def __init__(self, mi, order):
+        self.mi = mi
+        mi.file_resolver().prepend(str(Path(order['scene']).resolve().parent))
+        self.config = mi.parser.ParserConfig(order['variant'])
+        self.state = mi.parser.parse_file(self.config, order['scene'], **dict(order['defines']))
+        mi.parser.transform_upgrade(self.config, self.state)
+        mi.parser.transform_resolve(self.config, self.state)
+        self.notes = []
+
+    def props(self, node):
+        return self.state.nodes[node].props
+
+    def is_a(self, node, kind):
+        return self.state.nodes[node].type == getattr(self.mi.ObjectType, kind)
+
+    def all(self, kind):
+        return [node for node in range(len(self.state.nodes)) if self.is_a(node, kind)]
+
+    def children(self, parent, kind):
+        props = self.props(parent)
+        values = [props[name] for name in props.keys()]
+        found = [v.index() for v in values if isinstance(v, self.mi.Properties.ResolvedReference)]
+        return [node for node in found if self.is_a(node, kind)]
+
+    def child(self, parent, kind, plugin):
+        """The first child of a kind, made with this plugin where there is none."""
+        for child in self.children(parent, kind):
+            return child
+        node = self.mi.parser.SceneNode()
+        node.type = getattr(self.mi.ObjectType, kind)
+        node.props = self.mi.Properties(plugin)
+        self.state.nodes.append(node)
+        added = len(self.state.nodes) - 1
+        self.props(parent)['etendue_' + plugin] = self.mi.Properties.ResolvedReference(added)
+        return added
+
+    def exists(self, node):
+        manager = self.mi.PluginManager.instance()
+        return manager.plugin_type(self.props(node).plugin_name()) != self.mi.ObjectType.Unknown
+
+    def replace_samplers(self):
+        """How points are placed changes the noise and not the mean: `independent` stands in for the rest."""
+        for node in self.all('Sampler'):
+            if self.exists(node):
+                continue
+            props, other = self.props(node), self.mi.Properties('independent')
+            self.notes.append(f'Mitsuba has no sampler "{props.plugin_name()}" and takes independent points')
+            if 'sample_count' in props:
+                other['sample_count'] = props['sample_count']
+            self.state.nodes[node].props = other
+
+    def refuse_missing(self):
+        """Raises `Refused` with every plugin that is not there."""
+        missing = []
+        for node in range(len(self.state.nodes)):
+            if not self.exists(node):
+                kind = self.state.nodes[node].type.name
+                what = f'{TAGS.get(kind, kind.lower())} "{self.props(node).plugin_name()}"'
+                if what not in missing:
+                    missing.append(what)
+        if missing:
+            raise Refused('Mitsuba has no ' + ' and no '.join(missing))
+
+    def override(self, order):
+        """Puts the order's values where the scene's stand, as `etendue render` does with its options."""
+        root = 0
+        integrator = self.child(root, 'Integrator', 'path')
+        if order['max_depth'] is not None:
+            while self.children(integrator, 'Integrator'):
+                integrator = self.children(integrator, 'Integrator')[0]
+            self.props(integrator)['max_depth'] = order['max_depth']
+        for sensor in self.children(root, 'Sensor'):
+            film = self.child(sensor, 'Film', 'hdrfilm')
+            if order['size'] is not None:
+                self.props(film)['width'], self.props(film)['height'] = order['size']
+            sampler = self.child(sensor, 'Sampler', 'independent')
+            if order['spp'] is not None:
+                self.props(sampler)['sample_count'] = order['spp']
+
+    def build(self):
+        # What `mi.load_file` does too. It puts the whole scene into one node, so it comes last.
+        self.mi.parser.transform_merge_equivalent(self.config, self.state)
+        self.mi.parser.transform_merge_meshes(self.config, self.state)
+        built = self.mi.parser.instantiate(self.config, self.state)
+        scene = built[0] if isinstance(built, list) else built
+        if not isinstance(scene, self.mi.Scene) or not scene.sensors():
+            raise Refused('Mitsuba finds no scene with a sensor in the file')
+        return scene
+
+
+def load(mi, order):
+    """The scene, and what was done to it."""
+    try:
+        parsed = Parsed(mi, order)
+        parsed.replace_samplers()
+        parsed.refuse_missing()
+        parsed.override(order)
+        return parsed.build(), parsed.notes
+    except Refused:
+        raise
+    except Exception as error:
+        raise Refused(f'Mitsuba refuses the scene: {error}') from error
+
+
+def main():
+    # What Mitsuba prints goes to standard error: the answers have the standard output to themselves.
+    answers = os.fdopen(os.dup(1), 'w', encoding='utf-8')
+    os.dup2(2, 1)
+
+    def answer(kind, content):
+        answers.write(json.dumps({kind: content}) + '\n')
+        answers.flush()
+
+    order = json.loads(sys.stdin.readline())
+    import mitsuba as mi
+    if order['variant'] not in mi.variants():
+        return answer('refused', f'Mitsuba {mi.__version__} has no variant "{order["variant"]}"; there are '
+                      + ', '.join(mi.variants()))
+    mi.set_variant(order['variant'])
+    mi.set_log_level(mi.LogLevel.Error)
+    if order['threads'] is not None:
+        import drjit
+        drjit.set_thread_count(order['threads'])
+    if order['plugins'] is not None:
+        import_plugins(order['plugins'])
+
+    clock = Clock()
+    try:
+        scene, notes = load(mi, order)
+    except Refused as error:
+        return answer('refused', str(error))
+    answer('loaded', dict(renderer=f'Mitsuba {mi.__version__}, {order["variant"]}', time=clock.time(),
+                          notes=notes))
+    sensor, integrator = scene.sensors()[0], scene.integrator()
+    film, spp = sensor.film(), sensor.sampler().sample_count()
+    for line in sys.stdin:
+        seed = int(line)
+        clock = Clock()
+        integrator.render(scene, sensor=0, seed=seed, develop=False)
+        bitmap = film.bitmap()
+        taken = clock.time()
+        path = str(Path(order['folder']) / f'mitsuba-{seed}.exr')
+        bitmap.write(path)
+        answer('rendered', dict(image=path, spp=spp, time=taken))
+
+
+if __name__ == '__main__':
+    try:
+        main()
+    except BaseException:
+        import traceback
+        traceback.print_exc()
+        sys.stderr.flush()
+        os._exit(1)
+    # Nothing of the interpreter's way out is of interest, and Mitsuba may hang there.
+    sys.stderr.flush()
+    os._exit(0)

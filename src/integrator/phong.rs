@@ -1,0 +1,337 @@
+//! `phong`: the textbook's equation, I = I_a·k_a + Σ I_i·[k_d·max(0, L·N) + k_s·max(0, R·V)ⁿ] (Phong,
+//! *Illumination for computer generated pictures*, 1975), with a shadow ray to every light at every hit, and
+//! mirrors and clear boundaries followed as in Whitted, *An improved illumination model for shaded display*
+//! (1980), but one ray at a time: where his tree splits, one branch is chosen and weighted.
+//!
+//! I_i is the intensity of a point light in the direction of the point, the irradiance that a directional
+//! light brings, and of area lights the integral of L·cos θ·dA over what can be seen of them, one point of
+//! which is drawn. With `falloff` `none` (default) that is all; `inverse_square` divides by the squared
+//! distance. An environment brings the integral of L·dω. There is no π: against `path`, a matte surface is π
+//! times as bright. `shadows` (true) may be switched off; `max_depth` and `rr_depth` are those of `path`;
+//! `layers` takes the image apart, see [`super::layers`].
+
+use super::layers::{Layers, Term};
+use super::path::Limits;
+use super::{Context, Estimate, Estimates, Estimator, FIRST_DIMENSION, Start, Stats};
+use crate::color::{ColorModel, Spectral};
+use crate::description::Properties;
+use crate::error::Result;
+use crate::interaction::{Hit, Interaction, Ray};
+use crate::light::LightSample;
+use crate::sampler::{Sampler, Stream};
+use crate::scene::Scene;
+
+/// The settings.
+#[derive(Clone, Debug)]
+pub struct Phong {
+    limits: Limits,
+    hide_emitters: bool,
+    falloff: Falloff,
+    shadows: bool,
+    layers: Layers,
+}
+
+/// How light fades on its way.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Falloff {
+    None,
+    InverseSquare,
+}
+
+const FALLOFFS: [&str; 2] = ["none", "inverse_square"];
+
+/// Dimensions of a bounce beside two a light: lobe, direction, roulette.
+const DIMENSIONS: u32 = 4;
+/// Shadow rays that are asked about at once: a scene may have any number of lights.
+const SHADOWS: usize = 1 << 14;
+
+/// A chain of mirrors and boundaries on its way.
+#[derive(Clone, Copy, Debug)]
+struct Walker<C: ColorModel> {
+    ray: Ray,
+    throughput: C::Sample,
+    wavelengths: C::Wavelengths,
+    stream: Stream,
+    /// Index of the start, and of the estimate.
+    slot: u32,
+    /// Product of the indices of refraction passed.
+    eta: f32,
+}
+
+/// A light's terms, whose visibility is still to be asked.
+#[derive(Clone, Copy, Debug)]
+struct Shadow<S> {
+    ray: Ray,
+    diffuse: S,
+    specular: S,
+    slot: u32,
+    light: u32,
+}
+
+/// What a batch has come to so far.
+#[derive(Debug)]
+struct Batch<'a, S> {
+    layers: &'a Layers,
+    /// How many layers there are.
+    count: usize,
+    values: &'a mut Vec<Estimate<S>>,
+    /// For each start a value a layer.
+    sums: Vec<S>,
+    shadows: Vec<Shadow<S>>,
+    blocked: Vec<bool>,
+}
+
+impl<S: Spectral> Batch<'_, S> {
+    fn add(&mut self, slot: u32, layer: Option<usize>, value: S) {
+        let slot = slot as usize;
+        self.values[slot].radiance += value;
+        if let Some(layer) = layer {
+            self.sums[slot * self.count + layer] += value;
+        }
+    }
+
+    fn light(&mut self, shadow: &Shadow<S>) {
+        let light = shadow.light as usize;
+        let layers = self.layers;
+        self.add(
+            shadow.slot,
+            layers.place(Term::Diffuse, light),
+            shadow.diffuse,
+        );
+        self.add(
+            shadow.slot,
+            layers.place(Term::Specular, light),
+            shadow.specular,
+        );
+    }
+
+    /// Adds what the lights bring that can be seen.
+    fn flush<C: ColorModel<Sample = S>>(&mut self, scene: &Scene<C>, stats: &mut Stats) {
+        stats.shadow_rays += self.shadows.len() as u64;
+        let rays = self.shadows.iter().map(|s| s.ray);
+        scene.occluded(rays, &mut self.blocked, &mut stats.tracing);
+        let mut shadows = std::mem::take(&mut self.shadows);
+        for (i, shadow) in shadows.iter().enumerate() {
+            if !self.blocked[i] {
+                self.light(shadow);
+            }
+        }
+        shadows.clear();
+        self.shadows = shadows;
+    }
+}
+
+impl Phong {
+    pub(super) fn build(properties: &Properties<'_>, context: &Context) -> Result<Self> {
+        let falloff = match properties.string("falloff")?.unwrap_or(FALLOFFS[0]) {
+            "none" => Falloff::None,
+            "inverse_square" => Falloff::InverseSquare,
+            other => {
+                let error = properties.error("falloff", format!("unknown falloff {other:?}"));
+                return Err(error
+                    .suggest(other, FALLOFFS)
+                    .help("there are \"none\" and \"inverse_square\""));
+            }
+        };
+        Ok(Self {
+            limits: Limits::build(properties)?,
+            hide_emitters: properties.boolean("hide_emitters")?.unwrap_or(false),
+            falloff,
+            shadows: properties.boolean("shadows")?.unwrap_or(true),
+            layers: Layers::build(properties, &context.lights)?,
+        })
+    }
+
+    /// What the ray meets at its end, if anything: emission and ambient light go to the estimate.
+    fn arrive<'s, C: ColorModel>(
+        &self,
+        scene: &'s Scene<C>,
+        depth: u32,
+        walker: &Walker<C>,
+        hit: &Hit,
+        batch: &mut Batch<'_, C::Sample>,
+    ) -> Option<Interaction<'s>> {
+        let (ray, w) = (&walker.ray, &walker.wavelengths);
+        let at = (!hit.is_miss()).then(|| scene.interaction(ray, hit));
+        let (light, emission) = match &at {
+            Some(at) => (scene.light_at(at), scene.emitted(at, ray.origin, w)),
+            None => (scene.environment(), scene.surrounding(ray.direction, w)),
+        };
+        let shown = depth > 0 || !self.hide_emitters;
+        if let (Some(light), Some((radiance, _)), true) = (light, emission, shown) {
+            let layer = self.layers.place(Term::Emission, light.index());
+            batch.add(walker.slot, layer, walker.throughput * radiance);
+        }
+        if let Some(ambient) = at.as_ref().and_then(|at| scene.ambient(at, w)) {
+            let layer = self.layers.ambient();
+            batch.add(walker.slot, layer, walker.throughput * ambient);
+        }
+        if depth == 0 {
+            let surrounded = scene.has_environment() && !self.hide_emitters;
+            batch.values[walker.slot as usize].alpha =
+                if at.is_some() || surrounded { 1.0 } else { 0.0 };
+        }
+        at
+    }
+
+    /// The terms of one light at a point, as if nothing stood between.
+    fn light<C: ColorModel>(
+        &self,
+        scene: &Scene<C>,
+        sampler: &Sampler,
+        light: usize,
+        walker: &mut Walker<C>,
+        at: &Interaction<'_>,
+    ) -> Option<Shadow<C::Sample>> {
+        let (u, w) = (walker.stream.next_2d(sampler), &walker.wavelengths);
+        let LightSample {
+            direction,
+            target,
+            radiance,
+            pdf,
+            ..
+        } = scene.lights()[light].sample(at.position, u, w)?;
+        let wo = at.frame.to_local(direction);
+        let terms = scene.material(at).phong(at, at.wi, wo, w)?;
+        // What a light sample brings has the inverse square in it.
+        let squared = match (self.falloff, target) {
+            (Falloff::None, Some(target)) => target.distance_squared(at.position),
+            _ => 1.0,
+        };
+        let intensity = walker.throughput * radiance * (squared / pdf);
+        let (diffuse, specular) = (intensity * terms.diffuse, intensity * terms.specular);
+        let dark = diffuse.is_black() && specular.is_black();
+        (!dark).then(|| Shadow {
+            ray: target.map_or_else(|| at.spawn(direction), |target| at.spawn_to(target)),
+            diffuse,
+            specular,
+            slot: walker.slot,
+            light: light as u32,
+        })
+    }
+
+    /// Follows a mirror or a clear boundary at `at`; `None` where there is none.
+    fn follow<C: ColorModel>(
+        &self,
+        scene: &Scene<C>,
+        sampler: &Sampler,
+        depth: u32,
+        mut walker: Walker<C>,
+        at: &Interaction<'_>,
+    ) -> Option<Walker<C>> {
+        let (u1, u2) = (
+            walker.stream.next_1d(sampler),
+            walker.stream.next_2d(sampler),
+        );
+        let sample = scene
+            .material(at)
+            .sample(at, at.wi, u1, u2, &walker.wavelengths)
+            .filter(|sample| sample.delta)?;
+        walker.throughput *= sample.weight;
+        walker.eta *= sample.eta;
+        walker.ray = at.spawn(at.frame.to_world(sample.wo));
+        let survival = self.limits.survival(depth, walker.throughput, walker.eta)?;
+        if survival < 1.0 && walker.stream.next_1d(sampler) >= survival {
+            return None;
+        }
+        walker.throughput = walker.throughput / survival;
+        Some(walker)
+    }
+}
+
+impl<C: ColorModel> Estimator<C> for Phong {
+    fn extra_channels(&self) -> Vec<String> {
+        let names = self.layers.names();
+        let channels = names
+            .iter()
+            .flat_map(|name| ["R", "G", "B"].map(|c| format!("{name}.{c}")));
+        channels.collect()
+    }
+
+    fn estimate(
+        &self,
+        scene: &Scene<C>,
+        sampler: &Sampler,
+        starts: &[Start<C>],
+        estimates: &mut Estimates<C::Sample>,
+        stats: &mut Stats,
+    ) {
+        let nothing = Estimate {
+            radiance: C::Sample::zero(),
+            alpha: 0.0,
+        };
+        estimates.values.clear();
+        estimates.values.resize(starts.len(), nothing);
+        let count = self.layers.names().len();
+        let mut batch = Batch {
+            layers: &self.layers,
+            count,
+            values: &mut estimates.values,
+            sums: vec![C::Sample::zero(); starts.len() * count],
+            shadows: Vec::new(),
+            blocked: Vec::new(),
+        };
+        let walker = |(slot, start): (usize, &Start<C>)| Walker {
+            ray: start.ray,
+            throughput: scene.color().unit(),
+            wavelengths: start.wavelengths,
+            stream: start.stream,
+            slot: slot as u32,
+            eta: 1.0,
+        };
+        let mut walkers: Vec<Walker<C>> = starts.iter().enumerate().map(walker).collect();
+        let lights = scene.lights().len();
+        let dimensions = DIMENSIONS + 2 * lights as u32;
+        let (mut rays, mut hits) = (Vec::new(), Vec::new());
+        for depth in 0..self.limits.max_depth {
+            if walkers.is_empty() {
+                break;
+            }
+            rays.clear();
+            rays.extend(walkers.iter().map(|w| w.ray));
+            *if depth == 0 {
+                &mut stats.camera_rays
+            } else {
+                &mut stats.bounce_rays
+            } += rays.len() as u64;
+            scene.closest(&rays, &mut hits, &mut stats.tracing);
+
+            let mut hits = hits.iter();
+            walkers = walkers
+                .into_iter()
+                .filter_map(|mut walker| {
+                    let hit = hits.next().expect("every ray has its hit");
+                    let at = self.arrive(scene, depth, &walker, hit, &mut batch)?;
+                    if depth + 1 >= self.limits.max_depth {
+                        return None;
+                    }
+                    stats.shaded += 1;
+                    let first = depth.wrapping_mul(dimensions);
+                    walker.stream.seek(FIRST_DIMENSION.wrapping_add(first));
+                    let smooth = scene.material(&at).is_smooth();
+                    for light in (0..lights).filter(|_| smooth) {
+                        match self.light(scene, sampler, light, &mut walker, &at) {
+                            Some(shadow) if self.shadows => batch.shadows.push(shadow),
+                            Some(shadow) => batch.light(&shadow),
+                            None => {}
+                        }
+                        if batch.shadows.len() == SHADOWS {
+                            batch.flush(scene, stats);
+                        }
+                    }
+                    self.follow(scene, sampler, depth, walker, &at)
+                })
+                .collect();
+            batch.flush(scene, stats);
+        }
+
+        let sums = batch.sums;
+        estimates.extra.clear();
+        let mut developed = vec![0.0; scene.color().channels().len()];
+        for (i, sum) in sums.iter().enumerate() {
+            let w = &starts[i / count].wavelengths;
+            scene.color().develop(sum, w, &mut developed);
+            estimates.extra.extend_from_slice(&developed[..3]);
+        }
+    }
+}
