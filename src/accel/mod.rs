@@ -320,4 +320,6 @@ impl<'t> Walk<'t> {
 }
 
 #[cfg(test)]
+mod surface_tests;
+#[cfg(test)]
 mod tests;

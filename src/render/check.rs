@@ -9,9 +9,7 @@ use crate::accel::Method;
 use crate::color::ColorModel;
 use crate::description::{Description, Kind};
 use crate::error::{Problem, Problems, Result};
-use crate::material::Material;
 use crate::scene;
-use crate::texture::Palettes;
 
 /// Finds everything that is wrong with a scene; what is merely worth knowing is returned.
 ///
@@ -52,7 +50,9 @@ impl Task for Check<'_> {
                 warnings.extend_from_slice(assets.warnings());
                 problems.take(scene::build(description, &assets, color, Method::Brute));
             }
-            None => materials(description, color, &mut problems),
+            None => {
+                problems.take(scene::check_materials(description, color));
+            }
         }
         // Whoever failed has not read all that it would have read.
         if problems.is_empty() {
@@ -60,16 +60,6 @@ impl Task for Check<'_> {
         }
         problems.finish()?;
         Ok(warnings)
-    }
-}
-
-/// What is wrong with the materials of shapes, one of which could not be loaded.
-fn materials<C: ColorModel>(description: &Description, color: C, problems: &mut Problems) {
-    let palettes = Palettes::new(color);
-    for shape in description.root().children(Kind::Shape) {
-        for material in shape.children(Kind::Bsdf) {
-            problems.take(Material::build(&material, &palettes));
-        }
     }
 }
 

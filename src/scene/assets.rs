@@ -1,6 +1,10 @@
 //! The geometry of a scene, loaded in parallel. A `shapegroup` holds shapes in a space of their own, seen only
 //! where an `instance` refers to it, through the instance's `to_world`; their materials are the group's, and
 //! none of them emits light, as in Mitsuba.
+//!
+//! A `group`, Étendue's own, is a node of a scene graph: it holds shapes, instances and groups, which stand under its
+//! `to_world` (a node's matrix is its parent's times its own), and of which those without a material have the group's.
+//! The graph is flattened here: a shape is loaded for each path that leads to it, in world space.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -29,6 +33,8 @@ pub(super) struct Member {
     pub(super) node: NodeId,
     /// 0 for the world.
     pub(super) group: u32,
+    /// The material that it has from a group around it, unless it has its own.
+    pub(super) bsdf: Option<NodeId>,
     /// In its group's space.
     pub(super) geometry: Arc<Geometry>,
 }
@@ -39,9 +45,11 @@ impl Assets {
     pub fn load(description: &Description, loaded: &(impl Fn() + Sync)) -> Result<Self> {
         let mut plan = Plan::default();
         for properties in description.root().children(Kind::Shape) {
-            let placed = plan.place(&properties);
-            if plan.problems.take(placed) == Some(Placed::Elsewhere) {
-                loaded();
+            let placed = plan.place(properties, &Space::WORLD);
+            plan.problems.take(placed);
+            let last = plan.shapes.last().map(|shape| shape.properties.node_id());
+            if last != Some(properties.node_id()) {
+                loaded(); // it is a group or an instance
             }
         }
         let Plan {
@@ -52,9 +60,9 @@ impl Assets {
         } = plan;
         let results: Vec<Result<Shape>> = shapes
             .par_iter()
-            .map(|(properties, group)| {
-                let shape = shape::build(properties);
-                if *group == 0 {
+            .map(|Planned { properties, space }| {
+                let shape = shape::build_within(&space.outer, properties);
+                if space.top {
                     loaded();
                 }
                 shape
@@ -62,12 +70,13 @@ impl Assets {
             .collect();
         let mut warnings: Vec<Problem> = media(&shapes).into_iter().collect();
         let mut members = Vec::with_capacity(shapes.len());
-        for ((properties, group), result) in shapes.iter().zip(results) {
+        for (Planned { properties, space }, result) in shapes.iter().zip(results) {
             if let Some(shape) = problems.take(result) {
                 warnings.extend(shape.warnings);
                 members.push(Member {
                     node: properties.node_id(),
-                    group: *group,
+                    group: space.group,
+                    bsdf: space.bsdf,
                     geometry: Arc::new(shape.geometry),
                 });
             }
@@ -98,10 +107,10 @@ impl Assets {
 }
 
 /// The warning for participating media, which shapes may enclose and Étendue does not render.
-fn media(shapes: &[(Properties<'_>, u32)]) -> Option<Problem> {
+fn media(shapes: &[Planned<'_>]) -> Option<Problem> {
     let media: Vec<_> = shapes
         .iter()
-        .flat_map(|(shape, _)| shape.children(Kind::Medium))
+        .flat_map(|shape| shape.properties.children(Kind::Medium))
         .collect();
     let message = format!(
         "participating media are not rendered: {} shapes count as empty",
@@ -111,66 +120,116 @@ fn media(shapes: &[(Properties<'_>, u32)]) -> Option<Problem> {
     warning.problems().first().cloned()
 }
 
+/// A shape that is to be loaded.
+struct Planned<'a> {
+    properties: Properties<'a>,
+    space: Space<'a>,
+}
+
+/// Where a shape stands.
+#[derive(Clone, Copy)]
+struct Space<'a> {
+    /// The `shapegroup`, if it is in one.
+    shapegroup: Option<Properties<'a>>,
+    /// Its number; 0 for the world.
+    group: u32,
+    /// The product of the transforms of the groups around it, the outermost first.
+    outer: DMat4,
+    /// The material of the nearest of those groups that has one.
+    bsdf: Option<NodeId>,
+    /// Whether it stands in the scene itself, and in no group.
+    top: bool,
+}
+
+/// The most shapes that all groups may stand for.
+const MAX_SHAPES: usize = 1 << 20;
+
 /// What is to be loaded.
 #[derive(Default)]
 struct Plan<'a> {
-    /// Each with its group.
-    shapes: Vec<(Properties<'a>, u32)>,
-    /// The groups' numbers, from 1.
+    shapes: Vec<Planned<'a>>,
+    /// The shapegroups' numbers, from 1.
     groups: HashMap<NodeId, u32>,
     instances: Vec<Instance>,
+    /// How many shapes were met, each as often as it is referred to.
+    met: usize,
     problems: Problems,
 }
 
-/// Where a shape of the scene went.
-#[derive(PartialEq)]
-enum Placed {
-    /// Among the shapes of the world.
-    World,
-    /// It is a group or an instance.
-    Elsewhere,
-}
-
 impl<'a> Plan<'a> {
-    fn place(&mut self, properties: &Properties<'a>) -> Result<Placed> {
-        match properties.plugin() {
+    /// Notes what a shape stands for in its space.
+    fn place(&mut self, properties: Properties<'a>, space: &Space<'a>) -> Result<()> {
+        self.met += 1;
+        if self.met > MAX_SHAPES && !space.top {
+            let message = format!("groups stand for more than {MAX_SHAPES} shapes");
+            return Err(properties
+                .error("", message)
+                .help("place copies as instances of a shapegroup"));
+        }
+        let plugin = properties.plugin();
+        if let (Some(group), shape::GROUP | shape::INSTANCE) = (space.shapegroup, plugin) {
+            let message = format!("a shapegroup cannot hold a shape {plugin:?}");
+            let error = Error::input(message).at(properties.location());
+            return Err(error.related(group.location(), "the group"));
+        }
+        match plugin {
             shape::GROUP => {
-                self.group(properties);
+                self.shapegroup(properties);
+                Ok(())
             }
-            shape::INSTANCE => self.instance(properties)?,
+            shape::INSTANCE => self.instance(&properties, space),
+            shape::NODE => self.node(&properties, space),
             _ => {
-                self.shapes.push((*properties, 0));
-                return Ok(Placed::World);
+                if space.shapegroup.is_some() {
+                    for emitter in properties.children(Kind::Emitter) {
+                        let error = Error::input("a shape of a shapegroup cannot emit light");
+                        self.problems.push(error.at(emitter.location()));
+                    }
+                }
+                let space = *space;
+                self.shapes.push(Planned { properties, space });
+                Ok(())
             }
         }
-        Ok(Placed::Elsewhere)
     }
 
-    /// The group's number.
-    fn group(&mut self, properties: &Properties<'a>) -> u32 {
+    /// Notes the shapes of a node of the scene graph. Nodes are not nested without end.
+    fn node(&mut self, properties: &Properties<'a>, space: &Space<'a>) -> Result<()> {
+        let own = properties.transform("to_world")?;
+        let bsdf = properties.child(Kind::Bsdf)?;
+        let inner = Space {
+            outer: own.map_or(space.outer, |own| space.outer * own),
+            bsdf: bsdf.map(|bsdf| bsdf.node_id()).or(space.bsdf),
+            top: false,
+            ..*space
+        };
+        for child in properties.children(Kind::Shape) {
+            self.place(child, &inner)?;
+        }
+        Ok(())
+    }
+
+    /// The shapegroup's number.
+    fn shapegroup(&mut self, properties: Properties<'a>) -> u32 {
         if let Some(group) = self.groups.get(&properties.node_id()) {
             return *group;
         }
         let group = self.groups.len() as u32 + 1;
         self.groups.insert(properties.node_id(), group);
+        let space = Space {
+            shapegroup: Some(properties),
+            group,
+            top: false,
+            ..Space::WORLD
+        };
         for shape in properties.children(Kind::Shape) {
-            if let shape::GROUP | shape::INSTANCE = shape.plugin() {
-                let message = format!("a shapegroup cannot hold a shape {:?}", shape.plugin());
-                let error = Error::input(message).at(shape.location());
-                self.problems
-                    .push(error.related(properties.location(), "the group"));
-                continue;
-            }
-            for emitter in shape.children(Kind::Emitter) {
-                let error = Error::input("a shape of a shapegroup cannot emit light");
-                self.problems.push(error.at(emitter.location()));
-            }
-            self.shapes.push((shape, group));
+            let placed = self.place(shape, &space);
+            self.problems.take(placed);
         }
         group
     }
 
-    fn instance(&mut self, properties: &Properties<'a>) -> Result<()> {
+    fn instance(&mut self, properties: &Properties<'a>, space: &Space<'a>) -> Result<()> {
         let children = properties.children(Kind::Shape);
         let [group] = children[..] else {
             let message = format!(
@@ -190,14 +249,26 @@ impl<'a> Plan<'a> {
                 .error("", message)
                 .related(group.location(), "this"));
         }
-        let matrix = properties.transform("to_world")?.unwrap_or(DMat4::IDENTITY);
+        let own = properties.transform("to_world")?;
+        let matrix = own.map_or(space.outer, |own| space.outer * own);
         let to_world = Transform::new(&matrix).ok_or_else(|| {
             properties.error("to_world", "the transform must be affine and invertible")
         })?;
-        let group = self.group(&group);
+        let group = self.shapegroup(group);
         self.instances.push(Instance { to_world, group });
         Ok(())
     }
+}
+
+impl Space<'_> {
+    /// The scene itself.
+    const WORLD: Self = Self {
+        shapegroup: None,
+        group: 0,
+        outer: DMat4::IDENTITY,
+        bsdf: None,
+        top: true,
+    };
 }
 
 #[cfg(test)]
@@ -208,11 +279,17 @@ mod tests {
     use crate::description::Options;
 
     fn load(text: &str) -> Result<Assets> {
+        let (assets, unread) = load_in_part(text)?;
+        assert_eq!(unread, []);
+        Ok(assets)
+    }
+
+    /// The assets, and what loading them did not read.
+    fn load_in_part(text: &str) -> Result<(Assets, Vec<Problem>)> {
         let text = format!(r#"<scene version="3.0.0">{text}</scene>"#);
         let scene = Description::parse(&text, Path::new("test.xml"), &Options::default())?;
         let assets = Assets::load(&scene, &|| ())?;
-        assert_eq!(scene.unread(), []);
-        Ok(assets)
+        Ok((assets, scene.unread()))
     }
 
     #[test]
@@ -235,6 +312,73 @@ mod tests {
     }
 
     #[test]
+    fn a_node_s_matrix_is_its_parent_s_times_its_own_and_materials_are_inherited() {
+        let (assets, unread) = load_in_part(
+            r#"<bsdf type="diffuse" id="outer"/><bsdf type="diffuse" id="inner"/><bsdf type="diffuse" id="own"/>
+               <shape type="group"><ref id="outer"/>
+                   <transform name="to_world"><scale value="2"/></transform>
+                   <shape type="disk" id="disk"/>
+                   <shape type="group" id="arm"><ref id="inner"/>
+                       <transform name="to_world"><translate x="1"/></transform>
+                       <shape type="disk"><transform name="to_world"><translate x="0.5"/></transform></shape>
+                       <shape type="disk"><ref id="own"/><emitter type="area"/></shape>
+                       <shape type="instance"><ref id="shared"/></shape>
+                   </shape>
+               </shape>
+               <shape type="group"><ref id="arm"/><ref id="disk"/></shape>
+               <shape type="shapegroup" id="shared"><shape type="group">
+                   <transform name="to_world"><translate x="7"/></transform><shape type="disk"/></shape></shape>"#,
+        )
+        .unwrap();
+        assert_eq!(
+            unread.len(),
+            2,
+            "a disk's own material and emitter: {unread:?}"
+        );
+        let places: Vec<(u32, f32, f64)> = (assets.shapes.iter())
+            .map(|s| {
+                let bounds = s.geometry.bounds(0);
+                let center = 0.5 * (bounds.min + bounds.max);
+                let radius = (s.geometry.area() / std::f64::consts::PI).sqrt();
+                (
+                    s.group,
+                    (center.x * 1e3).round() / 1e3,
+                    (radius * 1e6).round() / 1e6,
+                )
+            })
+            .collect();
+        let expected = [
+            (0, 0.0, 2.0),
+            (0, 3.0, 2.0),
+            (0, 2.0, 2.0),
+            (1, 7.0, 1.0),
+            (0, 1.5, 1.0),
+            (0, 1.0, 1.0),
+            (0, 0.0, 1.0),
+        ];
+        assert_eq!(places, expected);
+        let inherited: Vec<bool> = assets.shapes.iter().map(|s| s.bsdf.is_some()).collect();
+        assert_eq!(inherited, [true, true, true, false, true, true, false]);
+        assert_eq!(assets.shapes[1].bsdf, assets.shapes[4].bsdf);
+        assert_ne!(assets.shapes[0].bsdf, assets.shapes[1].bsdf);
+        let x: Vec<f32> = (assets.instances.iter())
+            .map(|i| i.to_world.translation().x)
+            .collect();
+        assert_eq!(x, [2.0, 1.0]);
+    }
+
+    #[test]
+    fn nodes_that_double_at_every_reference_are_refused_in_time() {
+        let mut text = r#"<shape type="group" id="n0"><shape type="disk"/></shape>"#.to_owned();
+        for i in 1..40 {
+            let child = format!(r#"<ref id="n{}"/>"#, i - 1);
+            text += &format!(r#"<shape type="group" id="n{i}">{child}{child}</shape>"#);
+        }
+        let error = load(&text).unwrap_err().to_string();
+        assert!(error.contains("groups stand for more than"), "{error}");
+    }
+
+    #[test]
     fn groups_in_groups_lights_in_groups_and_instances_of_something_else_are_refused() {
         for (text, message) in [
             (
@@ -244,6 +388,10 @@ mod tests {
             (
                 r#"<shape type="shapegroup"><shape type="disk"><emitter type="area"/></shape></shape>"#,
                 "cannot emit",
+            ),
+            (
+                r#"<shape type="shapegroup"><shape type="group"><shape type="instance"/></shape></shape>"#,
+                "cannot hold",
             ),
             (r#"<shape type="instance"/>"#, "one shapegroup"),
             (

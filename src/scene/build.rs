@@ -91,16 +91,15 @@ impl<C: ColorModel> Builder<'_, C> {
         }
     }
 
-    fn surfacing(
-        &mut self,
-        properties: &Properties<'_>,
-        geometry: &Arc<Geometry>,
-    ) -> Option<Surfacing> {
+    fn surfacing(&mut self, member: &Member) -> Option<Surfacing> {
+        let Member { geometry, .. } = member;
+        let properties = &self.description.node(member.node);
         let emitter = self
             .problems
             .take(properties.child(Kind::Emitter))
             .flatten();
-        let bsdf = self.problems.take(properties.child(Kind::Bsdf)).flatten();
+        let own = self.problems.take(properties.child(Kind::Bsdf)).flatten();
+        let bsdf = own.or_else(|| Some(self.description.node(member.bsdf?)));
         for user in emitter.iter().chain(&bsdf) {
             self.check_attributes(properties, geometry, user);
         }
@@ -148,6 +147,9 @@ pub fn check_materials<C: ColorModel>(description: &Description, color: C) -> Re
     let mut seen = HashSet::new();
     let mut shapes = description.root().children(Kind::Shape);
     while let Some(shape) = shapes.pop() {
+        if !seen.insert(shape.node_id()) {
+            continue;
+        }
         shapes.extend(shape.children(Kind::Shape));
         for bsdf in shape.children(Kind::Bsdf) {
             if seen.insert(bsdf.node_id()) {
@@ -175,8 +177,8 @@ pub fn build<C: ColorModel>(
     };
     let root = description.root();
     let mut surfacing = Vec::with_capacity(assets.shapes.len());
-    for Member { node, geometry, .. } in &assets.shapes {
-        surfacing.extend(builder.surfacing(&description.node(*node), geometry));
+    for member in &assets.shapes {
+        surfacing.extend(builder.surfacing(member));
     }
     let mut environment: Option<(LightId, Properties<'_>)> = None;
     for emitter in root.children(Kind::Emitter) {

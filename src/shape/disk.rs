@@ -3,7 +3,7 @@
 
 use std::f32::consts::TAU;
 
-use glam::{DAffine3, Vec2, Vec3};
+use glam::{DAffine3, DMat4, Vec2, Vec3};
 
 use super::{Bounds, Geometry, Shape, Surface, SurfaceSample, area_to_solid_angle, to_world};
 use crate::description::Properties;
@@ -22,28 +22,32 @@ pub struct Disk {
     area: f64,
 }
 
-pub(super) fn build(properties: &Properties<'_>) -> Result<Shape> {
-    let to_world = DAffine3::from_mat4(to_world(properties)?);
-    let to_local = to_world.inverse();
+pub(super) fn build(properties: &Properties<'_>, outer: &DMat4) -> Result<Shape> {
+    let to_world = DAffine3::from_mat4(to_world(properties, outer)?);
     let flip = properties.boolean("flip_normals")?.unwrap_or(false);
-    let [x, y] = [to_world.matrix3.x_axis, to_world.matrix3.y_axis];
-    // By the inverse transpose, whose rows are the columns here.
-    let normal = to_local.matrix3.row(2).normalize() * if flip { -1.0 } else { 1.0 };
-    let area = std::f64::consts::PI * x.cross(y).length();
-    if !(area > 0.0 && area.is_finite() && to_local.is_finite()) {
-        return Err(properties.error("to_world", "the disk has no finite, positive area"));
+    match Disk::new(to_world, flip) {
+        Some(disk) => Ok(Geometry::Disk(disk).into()),
+        None => Err(properties.error("to_world", "the disk has no finite, positive area")),
     }
-    let disk = Disk {
-        center: to_world.translation.as_vec3(),
-        axes: [x.as_vec3(), y.as_vec3()],
-        normal: normal.as_vec3(),
-        to_local,
-        area,
-    };
-    Ok(Geometry::Disk(disk).into())
 }
 
 impl Disk {
+    /// `None` where it has no finite, positive area.
+    pub(super) fn new(to_world: DAffine3, flip: bool) -> Option<Self> {
+        let to_local = to_world.inverse();
+        let [x, y] = [to_world.matrix3.x_axis, to_world.matrix3.y_axis];
+        // By the inverse transpose, whose rows are the columns here.
+        let normal = to_local.matrix3.row(2).normalize() * if flip { -1.0 } else { 1.0 };
+        let area = std::f64::consts::PI * x.cross(y).length();
+        (area > 0.0 && area.is_finite() && to_local.is_finite()).then(|| Self {
+            center: to_world.translation.as_vec3(),
+            axes: [x.as_vec3(), y.as_vec3()],
+            normal: normal.as_vec3(),
+            to_local,
+            area,
+        })
+    }
+
     fn position(&self, p: Vec2) -> Vec3 {
         self.center + self.axes[0] * p.x + self.axes[1] * p.y
     }
@@ -105,7 +109,7 @@ impl Surface for Disk {
             wi: frame.to_local(-ray.direction),
             time: ray.time,
             shape: hit.shape,
-            primitive: 0,
+            primitive: hit.primitive,
             mesh: None,
             barycentric: Vec2::ZERO,
         }

@@ -2,7 +2,7 @@
 
 use std::sync::OnceLock;
 
-use glam::{Vec2, Vec3};
+use glam::{DMat4, Vec2, Vec3};
 
 use super::{Bounds, Geometry, Shape, Surface, SurfaceSample, area_to_solid_angle, to_world};
 use crate::description::Properties;
@@ -176,8 +176,8 @@ impl Surface for TriangleMesh {
 }
 
 /// Puts a mesh into the world as its shape says: `to_world`, `face_normals`, `flip_normals`.
-pub(super) fn place(mut mesh: Mesh, properties: &Properties<'_>) -> Result<Shape> {
-    mesh.transform(&to_world(properties)?);
+pub(super) fn place(mut mesh: Mesh, properties: &Properties<'_>, outer: &DMat4) -> Result<Shape> {
+    mesh.transform(&to_world(properties, outer)?);
     // A transform can carry finite corners to infinity.
     let dropped = mesh.check().dropped_triangles;
     if properties.boolean("face_normals")?.unwrap_or(false) {
@@ -201,7 +201,11 @@ pub(super) fn place(mut mesh: Mesh, properties: &Properties<'_>) -> Result<Shape
 }
 
 /// Reads the file that a mesh plugin names, with that plugin's own `options`.
-pub(super) fn load(properties: &Properties<'_>, options: ReadOptions) -> Result<Shape> {
+pub(super) fn load(
+    properties: &Properties<'_>,
+    outer: &DMat4,
+    options: ReadOptions,
+) -> Result<Shape> {
     let Some(path) = properties.file("filename")? else {
         return Err(properties
             .error(
@@ -216,7 +220,7 @@ pub(super) fn load(properties: &Properties<'_>, options: ReadOptions) -> Result<
         ..options
     };
     let loaded = read(&path, &options).map_err(|e| e.named_at(properties.location()))?;
-    let mut shape = place(loaded.mesh, properties)?;
+    let mut shape = place(loaded.mesh, properties, outer)?;
     shape.warnings.splice(0..0, loaded.warnings);
     Ok(shape)
 }

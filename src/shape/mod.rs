@@ -1,19 +1,23 @@
 //! Shapes: what a scene's `<shape>` plugins build. Most build a triangle mesh, some a surface with an
 //! equation of its own; everything above sees a [`Geometry`].
 
-mod cylinder;
 mod disk;
+mod frustum;
 mod mesh;
 mod plane;
 mod sphere;
 
+mod cone;
 mod cube;
+mod cylinder;
 mod gltf;
 mod obj;
 mod ply;
+mod polygon;
 mod rectangle;
 mod serialized;
 mod stl;
+mod triangle;
 
 use glam::{DAffine3, DMat3, DMat4, DVec3, Vec2, Vec3};
 
@@ -24,8 +28,8 @@ use crate::interaction::{Hit, Interaction, Ray};
 use crate::math::{Transform, offset};
 use crate::mesh::Mesh;
 
-pub use cylinder::Cylinder;
 pub use disk::Disk;
+pub use frustum::Frustum;
 pub use mesh::TriangleMesh;
 pub use plane::Plane;
 pub use sphere::Sphere;
@@ -144,10 +148,10 @@ pub trait Surface: std::fmt::Debug + Send + Sync {
 pub enum Geometry {
     /// Triangles.
     Mesh(TriangleMesh),
-    /// A cylinder without caps.
-    Cylinder(Cylinder),
     /// A disk.
     Disk(Disk),
+    /// A cylinder or a cone.
+    Frustum(Frustum),
     /// A plane without an end.
     Plane(Plane),
     /// A sphere.
@@ -170,8 +174,8 @@ impl std::ops::Deref for Geometry {
     fn deref(&self) -> &Self::Target {
         match self {
             Self::Mesh(mesh) => mesh,
-            Self::Cylinder(cylinder) => cylinder,
             Self::Disk(disk) => disk,
+            Self::Frustum(frustum) => frustum,
             Self::Plane(plane) => plane,
             Self::Sphere(sphere) => sphere,
         }
@@ -196,10 +200,12 @@ impl From<Geometry> for Shape {
     }
 }
 
-type Build = fn(&Properties<'_>) -> Result<Shape>;
+/// What builds a shape that stands in groups whose transforms make up the matrix.
+type Build = fn(&Properties<'_>, &DMat4) -> Result<Shape>;
 
 /// The shape plugins.
 const PLUGINS: &[(&str, Build)] = &[
+    ("cone", cone::build),
     ("cube", cube::build),
     ("cylinder", cylinder::build),
     ("disk", disk::build),
@@ -207,10 +213,12 @@ const PLUGINS: &[(&str, Build)] = &[
     ("obj", obj::build),
     ("plane", plane::build),
     ("ply", ply::build),
+    ("polygon", polygon::build),
     ("rectangle", rectangle::build),
     ("serialized", serialized::build),
     ("sphere", sphere::build),
     ("stl", stl::build),
+    ("triangle", triangle::build),
 ];
 
 /// Shapes made of shapes, which the scene puts together: several in a space of their own, and those once
@@ -218,21 +226,28 @@ const PLUGINS: &[(&str, Build)] = &[
 pub const GROUP: &str = "shapegroup";
 /// See [`GROUP`].
 pub const INSTANCE: &str = "instance";
+/// A node of a scene graph: shapes that share its transform and its material.
+pub const NODE: &str = "group";
 
 /// The names of the plugins, as scene files write them.
 pub fn names() -> Vec<&'static str> {
     let single = PLUGINS.iter().map(|(name, _)| *name);
-    single.chain([GROUP, INSTANCE]).collect()
+    single.chain([GROUP, INSTANCE, NODE]).collect()
 }
 
 /// Builds the shape that `properties` names.
 pub fn build(properties: &Properties<'_>) -> Result<Shape> {
+    build_within(&DMat4::IDENTITY, properties)
+}
+
+/// Builds the shape that `properties` names, in a space from which `outer` leads to the world's.
+pub fn build_within(outer: &DMat4, properties: &Properties<'_>) -> Result<Shape> {
     debug_assert_eq!(properties.kind(), Kind::Shape);
     match PLUGINS
         .iter()
         .find(|(name, _)| *name == properties.plugin())
     {
-        Some((_, build)) => build(properties),
+        Some((_, build)) => build(properties, outer),
         None => Err(family::unknown(
             properties,
             "shape",
@@ -242,9 +257,10 @@ pub fn build(properties: &Properties<'_>) -> Result<Shape> {
     }
 }
 
-/// The property `to_world`, the identity by default.
-fn to_world(properties: &Properties<'_>) -> Result<DMat4> {
-    Ok(properties.transform("to_world")?.unwrap_or(DMat4::IDENTITY))
+/// The property `to_world`, the identity by default, and then `outer`.
+fn to_world(properties: &Properties<'_>, outer: &DMat4) -> Result<DMat4> {
+    let own = properties.transform("to_world")?;
+    Ok(own.map_or(*outer, |own| *outer * own))
 }
 
 /// A bound, for each axis, on the error of a world position that was computed in double precision from the

@@ -2,7 +2,7 @@
 //! `rectangle` without its edges: its texture coordinates are (p + 1)/2 as well, and go on beyond [0, 1]. The
 //! distance is s = −(d + N·O)/(N·D), in double precision.
 
-use glam::{DAffine3, DVec3, Vec2, Vec3};
+use glam::{DAffine3, DMat4, DVec3, Vec2, Vec3};
 
 use super::{Bounds, Geometry, Shape, Surface, SurfaceSample, rounding, to_world};
 use crate::description::Properties;
@@ -19,8 +19,8 @@ pub struct Plane {
     normal: Vec3,
 }
 
-pub(super) fn build(properties: &Properties<'_>) -> Result<Shape> {
-    let to_world = DAffine3::from_mat4(to_world(properties)?);
+pub(super) fn build(properties: &Properties<'_>, outer: &DMat4) -> Result<Shape> {
+    let to_world = DAffine3::from_mat4(to_world(properties, outer)?);
     let to_local = to_world.inverse();
     let flip = properties.boolean("flip_normals")?.unwrap_or(false);
     // By the inverse transpose, whose rows are the columns here.

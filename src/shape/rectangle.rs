@@ -1,10 +1,12 @@
 //! `rectangle`: the square [−1, 1]² at z = 0 facing +z, with uv = (p + 1)/2, under `to_world` and `flip_normals`.
 
+use glam::DMat4;
+
 use super::{Shape, mesh::place};
 use crate::description::Properties;
 use crate::error::Result;
 use crate::mesh;
 
-pub(super) fn build(properties: &Properties<'_>) -> Result<Shape> {
-    place(mesh::rectangle(), properties)
+pub(super) fn build(properties: &Properties<'_>, outer: &DMat4) -> Result<Shape> {
+    place(mesh::rectangle(), properties, outer)
 }

@@ -5,7 +5,7 @@
 
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
-use glam::{DVec3, Mat3, Vec2, Vec3};
+use glam::{DMat4, DVec3, Mat3, Vec2, Vec3};
 
 use super::{Bounds, Geometry, Shape, Surface, SurfaceSample, area_to_solid_angle, to_world};
 use crate::description::Properties;
@@ -24,8 +24,8 @@ pub struct Sphere {
     flip_normals: bool,
 }
 
-pub(super) fn build(properties: &Properties<'_>) -> Result<Shape> {
-    let to_world = to_world(properties)?;
+pub(super) fn build(properties: &Properties<'_>, outer: &DMat4) -> Result<Shape> {
+    let to_world = to_world(properties, outer)?;
     let center = properties.vector("center")?.unwrap_or(DVec3::ZERO);
     let radius = properties.float("radius")?.unwrap_or(1.0);
     let axes = [to_world.x_axis, to_world.y_axis, to_world.z_axis].map(|a| a.truncate());

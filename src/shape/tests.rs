@@ -9,6 +9,9 @@ use crate::math::{random, warp};
 
 const TILTED: &str = r#"<rotate x="1" angle="30"/><translate x="0.5" y="-2" z="1"/></transform>"#;
 
+const CAPS: &str = r#"<boolean name="caps" value="true"/>"#;
+const OPEN: &str = r#"<boolean name="base" value="false"/>"#;
+
 /// Scene text of each, with its area.
 fn surfaces() -> Vec<(String, f64)> {
     let placed = |plugin: &str, scale: &str, more: &str| {
@@ -28,6 +31,20 @@ fn surfaces() -> Vec<(String, f64)> {
         (placed("cylinder", "1", flipped), 2.0 * PI),
         (placed("cylinder", "2", ends), 8.0 * PI * 5f64.sqrt()),
         (placed("cylinder", "1, 2, -3", ""), 3.0 * ellipse),
+        (
+            placed("cylinder", "1, 2, -3", CAPS),
+            3.0 * ellipse + 4.0 * PI,
+        ),
+        (
+            placed("cylinder", "-1", &[CAPS, flipped].concat()),
+            4.0 * PI,
+        ),
+        (placed("cone", "1", ""), PI + PI * 2f64.sqrt()),
+        (placed("cone", "3, 3, -4", flipped), 9.0 * PI + 15.0 * PI),
+        (
+            placed("cone", "1", &[ends, OPEN].concat()),
+            PI * 6f64.sqrt(),
+        ),
     ]
 }
 
@@ -53,23 +70,31 @@ fn ray(origin: Vec3, target: Vec3) -> Ray {
     }
 }
 
-/// The first hit on a surface of one primitive.
+/// The first hit on a surface that is no mesh.
 fn meet<'g>(geometry: &'g Geometry, ray: &Ray) -> Option<Interaction<'g>> {
-    let (t, u, v) = geometry.intersect(0, ray)?;
-    let hit = Hit {
-        t,
-        u,
-        v,
-        instance: Hit::NONE,
-        shape: 0,
-        primitive: 0,
-    };
+    let hits = (0..geometry.primitive_count()).filter_map(|primitive| {
+        let (t, u, v) = geometry.intersect(primitive, ray)?;
+        Some(Hit {
+            t,
+            u,
+            v,
+            instance: Hit::NONE,
+            shape: 0,
+            primitive,
+        })
+    });
+    let hit = hits.min_by(|a, b| a.t.total_cmp(&b.t))?;
     Some(geometry.interaction(ray, &hit))
+}
+
+fn bounds(geometry: &Geometry) -> Bounds {
+    let boxes = (0..geometry.primitive_count()).map(|primitive| geometry.bounds(primitive));
+    boxes.fold(Bounds::EMPTY, Bounds::union)
 }
 
 /// Where the surface is looked at from.
 fn viewpoints(geometry: &Geometry) -> Vec<Vec3> {
-    let Bounds { min, max } = geometry.bounds(0);
+    let Bounds { min, max } = bounds(geometry);
     let (center, size) = (0.5 * (min + max), (max - min).length());
     let around = (0..6).map(|i| center + size * 0.9 * warp::uniform_sphere(point(7, i)));
     around.chain([center + Vec3::splat(0.01)]).collect()
@@ -80,7 +105,7 @@ fn every_surface_has_its_area_and_lies_in_its_box() {
     for (text, area) in surfaces() {
         let geometry = geometry(&text);
         assert!((geometry.area() / area - 1.0).abs() < 1e-6, "{text}");
-        let bounds = geometry.bounds(0);
+        let bounds = bounds(&geometry);
         let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
         for i in 0..20_000 {
             let sample = geometry.sample(Vec3::splat(30.0), point(1, i));
@@ -118,6 +143,9 @@ fn every_surface_is_met_where_it_is_drawn_with_the_same_normal_uv_and_density() 
                 if at.position.distance(sample.position) > 1e-4 * scale {
                     continue; // it stands in its own way
                 }
+                if at.primitive != sample.primitive {
+                    continue; // it is at an edge
+                }
                 seen += 1;
                 assert!(at.position.distance(ray.at(at.t)) < 1e-4 * scale, "{text}");
                 assert!(at.normal.dot(sample.normal) > 0.999, "{text}");
@@ -128,7 +156,7 @@ fn every_surface_is_met_where_it_is_drawn_with_the_same_normal_uv_and_density() 
                     assert!((ratio - 1.0).abs() < 0.02, "{text}: {ratio}");
                 }
             }
-            assert!(seen > 600, "{text}: {seen}");
+            assert!(seen > 250, "{text}: {seen}");
         }
     }
 }
@@ -302,6 +330,139 @@ fn hits_are_those_of_mitsuba() {
         near(at.uv.extend(0.0), [uv[0], uv[1], 0.0]);
         near(at.dp_du, dp_du);
         near(at.dp_dv, dp_dv);
+    }
+}
+
+#[test]
+fn a_plane_goes_on_where_the_rectangle_ends() {
+    let placed = |plugin: &str| {
+        geometry(&format!(
+            r#"<shape type="{plugin}"><transform name="to_world"><scale value="2, 3, 1"/>{TILTED}</shape>"#
+        ))
+    };
+    let (plane, rectangle) = (placed("plane"), placed("rectangle"));
+    assert!(plane.bounds(0).is_unbounded() && plane.area().is_infinite());
+    assert!(plane.sample(Vec3::ZERO, Vec2::ZERO).is_none());
+    for i in 0..100 {
+        let on = rectangle.sample(Vec3::Z, point(5, i)).unwrap();
+        let at = meet(&plane, &ray(Vec3::Z, on.position)).unwrap();
+        assert!(at.position.distance(on.position) < 1e-5);
+        assert!(at.normal.distance(on.normal) < 1e-5);
+        assert!(at.uv.distance(on.uv) < 1e-5);
+        assert!((at.dp_du.length() - 4.0).abs() < 1e-5 && (at.dp_dv.length() - 6.0).abs() < 1e-5);
+    }
+}
+
+#[test]
+fn triangles_and_polygons_have_their_corners_and_their_texture_coordinates() {
+    let corners = r#"<point name="p0" value="0, 0, 1"/><point name="p1" value="4, 0, 1"/>
+        <point name="p2" value="0, 2, 1"/>"#;
+    let uv = r#"<string name="uv" value="0 0, 0.5 0, 0 0.25"/>"#;
+    let normals = r#"<vector name="n0" value="0, 0, 2"/><vector name="n1" value="1, 0, 1"/>
+        <vector name="n2" value="0, 0, 1"/>"#;
+    for (text, uvs, bent) in [
+        (
+            format!(r#"<shape type="triangle">{corners}</shape>"#),
+            [0.0, 1.0, 1.0],
+            false,
+        ),
+        (
+            format!(r#"<shape type="polygon">{corners}</shape>"#),
+            [0.0, 1.0, 1.0],
+            false,
+        ),
+        (
+            format!(r#"<shape type="triangle">{corners}{uv}{normals}</shape>"#),
+            [0.0, 0.5, 0.25],
+            true,
+        ),
+        (
+            format!(r#"<shape type="polygon">{corners}{uv}</shape>"#),
+            [0.0, 0.5, 0.25],
+            false,
+        ),
+    ] {
+        let geometry = geometry(&text);
+        let mesh = geometry.mesh().unwrap();
+        assert_eq!(mesh.triangles.len(), 1, "{text}");
+        assert_eq!(geometry.area(), 4.0);
+        let expected = [
+            Vec2::splat(uvs[0]),
+            Vec2::new(uvs[1], 0.0),
+            Vec2::new(0.0, uvs[2]),
+        ];
+        assert_eq!(mesh.uvs, expected, "{text}");
+        assert_eq!(mesh.normals[0], Vec3::Z);
+        assert_eq!(mesh.normals[1] == Vec3::Z, !bent);
+    }
+}
+
+#[test]
+fn shapes_that_enclose_nothing_or_are_not_flat_are_refused_with_the_reason() {
+    let points = |points: &[&str]| -> String {
+        let one = |(i, p): (usize, &&str)| format!(r#"<point name="p{i}" value="{p}"/>"#);
+        points.iter().enumerate().map(one).collect()
+    };
+    let square = ["0,0,0", "1,0,0", "1,1,0", "0,1,0"];
+    for (plugin, body, message) in [
+        (
+            "cone",
+            r#"<float name="radius" value="0"/>"#.into(),
+            "a cone needs a positive radius",
+        ),
+        ("triangle", points(&square[..2]), "needs a point \"p2\""),
+        (
+            "triangle",
+            points(&["0,0,0", "1,1,1", "2,2,2"]),
+            "on a line",
+        ),
+        (
+            "triangle",
+            points(&square[..3]) + r#"<vector name="n0" value="0,0,1"/>"#,
+            "at each corner or at none",
+        ),
+        (
+            "triangle",
+            points(&square[..3]) + r#"<string name="uv" value="0 0 1 x 0 1"/>"#,
+            "3 pairs",
+        ),
+        ("polygon", points(&square[..2]), "three corners"),
+        (
+            "polygon",
+            points(&square).replace("p2", "p4"),
+            "no corner p2",
+        ),
+        (
+            "polygon",
+            points(&["0,0,0", "1,0,0", "1,1,0.1", "0,1,0"]),
+            "not flat",
+        ),
+        (
+            "polygon",
+            points(&["0,0,0", "1,0,0", "1,0,0", "0,1,0"]),
+            "p1 is the same as the next",
+        ),
+        (
+            "polygon",
+            points(&["0,0,0", "1,1,0", "2,2,0"]),
+            "encloses no area",
+        ),
+        (
+            "polygon",
+            points(&["0,0,0", "2,2,0", "2,0,0", "0,1,0"]),
+            "crosses itself",
+        ),
+        (
+            "polygon",
+            points(&["0,0,0", "4,0,0", "2,0,0", "2,2,0"]),
+            "turns back",
+        ),
+    ] {
+        let text =
+            format!(r#"<scene version="3.0.0"><shape type="{plugin}">{body}</shape></scene>"#);
+        let scene = Description::parse(&text, Path::new("test.xml"), &Options::default()).unwrap();
+        let error = build(&scene.root().children(Kind::Shape)[0]).unwrap_err();
+        assert!(error.to_string().contains(message), "{text}: {error}");
     }
 }
 
