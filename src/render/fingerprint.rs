@@ -85,7 +85,7 @@ impl Fingerprint {
             (
                 &self.settings,
                 &other.settings,
-                "a setting (the seed, the bands or the noise threshold and its limits)",
+                "a setting (the seed, the bands or adaptive sampling)",
             ),
         ]
         .into_iter()

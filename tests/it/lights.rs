@@ -198,7 +198,7 @@ fn light_drawn_toward_the_lamp_toward_the_material_and_both_is_the_same() {
                     {}{light}<shape type="rectangle">
                         <transform name="to_world"><scale value="10"/></transform>
                     </shape>"#,
-                    super::support::meter([8.0, 0.0, 2.0], [0.2, 0.1, 0.0], 24, 144)
+                    super::support::meter([8.0, 0.0, 2.0], [0.2, 0.1, 0.0], 24, 256)
                 ));
                 Mean::of_channel(&image_of(&text, 11), 1)
             });

@@ -187,7 +187,7 @@ fn a_time_limit_is_no_failure_and_can_be_continued() {
     assert_eq!(object(&other)["status"], "failed");
     let said = String::from_utf8_lossy(&other.stderr);
     assert!(
-        said.contains("a setting (the seed or the bands) has changed"),
+        said.contains("a setting (the seed, the bands or adaptive sampling) has changed"),
         "{said}"
     );
 }
