@@ -142,7 +142,7 @@ struct Space<'a> {
 }
 
 /// The most shapes that all groups may stand for.
-const MAX_SHAPES: usize = 1 << 20;
+pub(super) const MAX_SHAPES: usize = 1 << 20;
 
 /// What is to be loaded.
 #[derive(Default)]

@@ -4,7 +4,7 @@
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
-use super::assets::Member;
+use super::assets::{MAX_SHAPES, Member};
 use super::choice::Choice;
 use super::{Assets, LightId, MaterialId, Scene, Surfacing};
 use crate::accel::{Method, Tracer};
@@ -13,7 +13,7 @@ use crate::description::{Description, Kind, NodeId, Properties, Value};
 use crate::error::{Error, Problems, Result};
 use crate::light::{Light, LightContext};
 use crate::material::Material;
-use crate::shape::Geometry;
+use crate::shape::{self, Geometry};
 use crate::texture::Palettes;
 
 /// What is made while a scene is built.
@@ -167,25 +167,53 @@ pub fn check_materials<C: ColorModel>(description: &Description, color: C) -> Re
     problems.finish()
 }
 
-/// The names of a scene's [`Scene::lights`] in their order: a light's id, or its shape's, or its number.
+/// The names of a scene's [`Scene::lights`] in their order: a light's id, or its shape's, or its number where it
+/// has none or another light has the name.
 pub fn light_names(description: &Description) -> Vec<String> {
     let root = description.root();
-    let mut names = Vec::new();
-    let mut add = |light: &Properties<'_>, shape: Option<&Properties<'_>>| {
-        let id = light.id().or_else(|| shape?.id());
-        names.push(id.map_or_else(|| names.len().to_string(), str::to_owned));
-    };
+    let mut names = LightNames::default();
     for shape in root.peek_children(Kind::Shape) {
-        for light in shape.peek_children(Kind::Emitter) {
-            add(&light, Some(&shape));
-        }
+        names.visit(&shape);
     }
     for light in root.peek_children(Kind::Emitter) {
         if light.peek_plugin() != "ambient" {
-            add(&light, None);
+            names.add(light.id());
         }
     }
-    names
+    names.names
+}
+
+#[derive(Default)]
+struct LightNames {
+    names: Vec<String>,
+    taken: HashSet<String>,
+    visited: usize,
+}
+
+impl LightNames {
+    /// In the order in which [`Assets::load`] flattens groups, and no further than it does.
+    fn visit(&mut self, shape: &Properties<'_>) {
+        self.visited += 1;
+        if self.visited > MAX_SHAPES {
+            return;
+        }
+        for light in shape.peek_children(Kind::Emitter) {
+            self.add(light.id().or(shape.id()));
+        }
+        if shape.peek_plugin() == shape::NODE {
+            for child in shape.peek_children(Kind::Shape) {
+                self.visit(&child);
+            }
+        }
+    }
+
+    fn add(&mut self, id: Option<&str>) {
+        let number = self.names.len().to_string();
+        let free = id.filter(|id| !self.taken.contains(*id));
+        let name = free.map_or(number, str::to_owned);
+        self.taken.insert(name.clone());
+        self.names.push(name);
+    }
 }
 
 /// Builds the scene that `description` holds, with its geometry loaded.
@@ -273,5 +301,24 @@ mod tests {
             .to_string();
         assert!(error.starts_with("test.xml:2"), "{error}");
         assert!(error.contains("no attribute \"face_color\""), "{error}");
+    }
+
+    #[test]
+    fn lights_are_named_in_their_order_those_of_groups_where_the_groups_stand() {
+        let lamp = |id: &str| format!("<shape type='disk'{id}><emitter type='area'/></shape>");
+        let text = format!(
+            "<scene version='3.0.0'><emitter type='point' id='last'/>{}
+            <shape type='group'>{}<shape type='group'>{}</shape></shape>{}</scene>",
+            lamp(" id='first'"),
+            lamp(" id='nested'"),
+            lamp(""),
+            lamp(" id='after'")
+        );
+        let scene = Description::parse(&text, Path::new("test.xml"), &Options::default()).unwrap();
+        let names = light_names(&scene);
+        assert_eq!(names, ["first", "nested", "2", "after", "last"]);
+        let assets = Assets::load(&scene, &|| ()).unwrap();
+        let built = build(&scene, &assets, Rgb, Method::Tree).unwrap();
+        assert_eq!(built.lights().len(), names.len());
     }
 }
