@@ -7,8 +7,8 @@ use glam::Vec3;
 
 use crate::shape::{Bounds, Geometry};
 
-use super::Method;
 use super::wide::{Leaves, Tree};
+use super::{Method, Recipe};
 
 /// A primitive of a shape, or an instance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -121,7 +121,7 @@ impl Group {
     /// A group of items in their boxes.
     pub(super) fn new(
         placed: impl Iterator<Item = (Item, Bounds)>,
-        method: Method,
+        recipe: Recipe,
         shapes: &Shapes,
     ) -> Self {
         let is_finite = |b: &Bounds| b.min.is_finite() && b.max.is_finite();
@@ -137,15 +137,13 @@ impl Group {
         }
         let bounds = boxes.iter().copied().fold(Bounds::EMPTY, Bounds::union);
         let mut tree = Tree::default();
-        if method == Method::Tree {
+        if recipe.method == Method::Tree {
             let others;
-            (tree, others) = Tree::build(
-                &boxes,
-                &Members {
-                    items: &items,
-                    shapes,
-                },
-            );
+            let members = Members {
+                items: &items,
+                shapes,
+            };
+            (tree, others) = Tree::build(&boxes, &members, recipe.build);
             items = others.into_iter().map(|i| items[i as usize]).collect();
         }
         Self {

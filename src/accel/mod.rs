@@ -51,6 +51,52 @@ pub enum Method {
     Tree,
 }
 
+/// How much work goes into a tree. More makes rays faster and changes no hit.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Build {
+    /// Clusters are looked for near by.
+    Fast,
+    /// And further off, and the worst twentieth is placed anew.
+    #[default]
+    Medium,
+    /// And the worst fifth.
+    Slow,
+}
+
+impl Build {
+    /// The work that pays for so many primitives and rays.
+    pub fn suited(primitives: u64, rays: u64) -> Self {
+        match rays / primitives.max(1) {
+            0..MEDIUM_PAYS => Self::Fast,
+            MEDIUM_PAYS..SLOW_PAYS => Self::Medium,
+            SLOW_PAYS.. => Self::Slow,
+        }
+    }
+}
+
+/// From how many rays a primitive on more work has paid for itself.
+const MEDIUM_PAYS: u64 = 50;
+/// See `MEDIUM_PAYS`.
+const SLOW_PAYS: u64 = 800;
+
+/// How a tracer is made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Recipe {
+    /// Tree or brute force.
+    pub method: Method,
+    /// The work that goes into a tree.
+    pub build: Build,
+}
+
+impl From<Method> for Recipe {
+    fn from(method: Method) -> Self {
+        Self {
+            method,
+            ..Self::default()
+        }
+    }
+}
+
 /// A group's shapes put into the world once more.
 #[derive(Clone, Debug)]
 pub struct Instance {
@@ -79,8 +125,9 @@ impl Tracer {
         shapes: Vec<Arc<Geometry>>,
         group_of: &[u32],
         instances: Vec<Instance>,
-        method: Method,
+        recipe: impl Into<Recipe>,
     ) -> Self {
+        let recipe: Recipe = recipe.into();
         let count = 1 + group_of
             .iter()
             .copied()
@@ -100,7 +147,7 @@ impl Tracer {
             })
         };
         let mut groups: Vec<Group> = (1..count)
-            .map(|g| Group::new(members(g), method, &shapes))
+            .map(|g| Group::new(members(g), recipe, &shapes))
             .collect();
         let instance_bounds: Vec<Bounds> = (instances.iter())
             .map(|instance| {
@@ -115,14 +162,14 @@ impl Tracer {
         let placed = (0..)
             .map(Item::instance)
             .zip(instance_bounds.iter().copied());
-        let world = Group::new(members(0).chain(placed), method, &shapes);
+        let world = Group::new(members(0).chain(placed), recipe, &shapes);
         groups.insert(0, world);
         Self {
             shapes,
             instances,
             instance_bounds,
             groups,
-            method,
+            method: recipe.method,
             kernel: Kernel::best(),
         }
     }

@@ -1,6 +1,8 @@
 //! One thread's way through the groups: batches through the world's tree, single rays through those of
 //! instances, every item in turn for brute force; and items that are no triangles, whoever asks.
 
+use std::cmp::Ordering;
+
 use crate::interaction::{Hit, Ray};
 use crate::shape::{Bounds, Geometry};
 
@@ -50,64 +52,71 @@ impl<'t> Walk<'t> {
 
     /// Improves each ray's hit.
     pub(super) fn closest(&mut self, rays: &[Ray], hits: &mut [Hit]) {
-        self.rays::<false>(WORLD, rays, hits);
+        self.rays::<_, false>(WORLD, rays, hits);
     }
 
     /// Says of each ray whether anything lies on it.
     pub(super) fn occluded(&mut self, rays: &[Ray], blocked: &mut [bool]) {
-        let mut hits: Vec<Hit> = rays.iter().map(|ray| Hit::miss(ray.t_max)).collect();
-        self.rays::<true>(WORLD, rays, &mut hits);
-        for (blocked, hit) in blocked.iter_mut().zip(hits) {
-            *blocked = !hit.is_miss();
-        }
+        self.rays::<_, true>(WORLD, rays, &mut Shadows { rays, blocked });
     }
 
     /// Meets a group: improves each ray's hit; with `ANY`, by any that is there.
-    fn rays<const ANY: bool>(&mut self, way: Way, rays: &[Ray], hits: &mut [Hit]) {
+    fn rays<L: Ledger + ?Sized, const ANY: bool>(
+        &mut self,
+        way: Way,
+        rays: &[Ray],
+        ledger: &mut L,
+    ) {
         let tracer = self.tracer;
         let group = &tracer.groups[way.group as usize];
         if !group.unbounded().is_empty() {
-            self.items::<ANY>(way, group.unbounded(), rays, hits);
+            self.items::<_, ANY>(way, group.unbounded(), rays, ledger);
         }
         if tracer.method == Method::Brute {
-            return self.items::<ANY>(way, group.items(), rays, hits);
+            return self.items::<_, ANY>(way, group.items(), rays, ledger);
         }
+        let (tree, kernel) = (group.tree(), tracer.kernel);
         let mut counts = Counts::default();
         let mut inner = self.inner.take();
-        let mut party = Party::<ANY> {
+        let mut party = Party::<_, ANY> {
             walk: self,
             group,
             way,
             rays,
-            hits,
+            ledger,
         };
         if way.instance == Hit::NONE {
-            let count = rays.len();
-            group
-                .tree()
-                .batch::<_, ANY>(tracer.kernel, &mut party, count, &mut counts);
+            tree.batch::<_, ANY>(kernel, &mut party, rays.len(), &mut counts);
         } else {
             let flight = inner.get_or_insert_with(|| {
                 let levels = tracer.groups.iter().map(|group| group.tree().levels());
                 Flight::new(1, levels.max().unwrap_or(1))
             });
-            group
-                .tree()
-                .single::<_, ANY>(tracer.kernel, &mut party, flight, &mut counts);
+            tree.single::<_, ANY>(kernel, &mut party, flight, &mut counts);
         }
         self.inner = self.inner.take().or(inner);
         self.counts.add(&counts);
     }
 
     /// Meets items one after another.
-    fn items<const ANY: bool>(&mut self, way: Way, items: &[Item], rays: &[Ray], hits: &mut [Hit]) {
-        for (ray, hit) in rays.iter().zip(hits).filter(|(ray, _)| is_sound(ray)) {
+    fn items<L: Ledger + ?Sized, const ANY: bool>(
+        &mut self,
+        way: Way,
+        items: &[Item],
+        rays: &[Ray],
+        ledger: &mut L,
+    ) {
+        for (i, ray) in rays.iter().enumerate().filter(|(_, ray)| is_sound(ray)) {
             let (boxes, shear) = (RayBoxes::new(ray), Shear::new(ray));
+            let mut hit = ledger.hit(i);
             for item in items {
-                if ANY && !hit.is_miss() {
+                let found = self.item::<ANY>(item, ray, (&boxes, &shear), way, &mut hit);
+                if found {
+                    ledger.improve(i, hit);
+                }
+                if found && ANY {
                     break;
                 }
-                self.item::<ANY>(item, ray, (&boxes, &shear), way, hit);
             }
         }
     }
@@ -134,7 +143,7 @@ impl<'t> Walk<'t> {
             };
             let before = *best;
             let local = to_local(&to_world, ray);
-            self.rays::<ANY>(way, &[local], std::slice::from_mut(best));
+            self.rays::<[Hit], ANY>(way, &[local], std::slice::from_mut(best));
             return *best != before;
         }
         self.counts.primitive_tests += 1;
@@ -178,47 +187,91 @@ impl<'t> Walk<'t> {
     }
 }
 
+/// Where hits are written down.
+trait Ledger {
+    /// A ray's best hit so far; a miss says how far the ray goes.
+    fn hit(&self, ray: usize) -> Hit;
+    /// A better one.
+    fn improve(&mut self, ray: usize, hit: Hit);
+}
+
+impl Ledger for [Hit] {
+    #[inline(always)]
+    fn hit(&self, ray: usize) -> Hit {
+        self[ray]
+    }
+
+    #[inline(always)]
+    fn improve(&mut self, ray: usize, hit: Hit) {
+        self[ray] = hit;
+    }
+}
+
+/// Rays of which nobody asks more than whether they are blocked.
+struct Shadows<'a> {
+    rays: &'a [Ray],
+    blocked: &'a mut [bool],
+}
+
+impl Ledger for Shadows<'_> {
+    #[inline(always)]
+    fn hit(&self, ray: usize) -> Hit {
+        // What is blocked goes nowhere.
+        let end = if self.blocked[ray] {
+            f32::NEG_INFINITY
+        } else {
+            self.rays[ray].t_max
+        };
+        Hit::miss(end)
+    }
+
+    #[inline(always)]
+    fn improve(&mut self, ray: usize, _: Hit) {
+        self.blocked[ray] = true;
+    }
+}
+
 /// Rays that walk one group's tree together.
-struct Party<'w, 't, 'r, const ANY: bool> {
+struct Party<'w, 't, 'r, L: ?Sized, const ANY: bool> {
     walk: &'w mut Walk<'t>,
     group: &'t Group,
     way: Way,
     rays: &'r [Ray],
-    hits: &'r mut [Hit],
+    ledger: &'r mut L,
 }
 
-impl<const ANY: bool> Party<'_, '_, '_, ANY> {
+impl<L: Ledger + ?Sized, const ANY: bool> Party<'_, '_, '_, L, ANY> {
     /// A hit as the tree knows it. At an equal distance the one of the lower instance comes first, which
     /// the tree is told by numbers that all or none of its triangles are below.
+    #[inline(always)]
     fn best(&self, hit: &Hit) -> Best {
-        let id = if hit.instance != self.way.instance {
-            if hit.instance > self.way.instance {
-                u32::MAX
-            } else {
-                0
+        if hit.is_miss() {
+            return Best {
+                t: hit.t,
+                id: u32::MAX,
+                place: Place::NOWHERE,
+            };
+        }
+        let id = match hit.instance.cmp(&self.way.instance) {
+            Ordering::Less => 0,
+            Ordering::Greater => u32::MAX,
+            Ordering::Equal => {
+                let item = Item::primitive(hit.shape, hit.primitive);
+                self.walk.tracer.shapes.number(item)
             }
-        } else if hit.is_miss() {
-            u32::MAX
-        } else {
-            let item = Item::primitive(hit.shape, hit.primitive);
-            self.walk.tracer.shapes.number(item)
         };
         Best {
             t: hit.t,
             id,
-            place: if hit.is_miss() {
-                Place::NOWHERE
-            } else {
-                Place::OUTSIDE
-            },
+            place: Place::OUTSIDE,
         }
     }
 
-    /// The hit of the triangle with this number.
-    fn triangle(&self, t: f32, id: u32, (u, v): (f32, f32)) -> Hit {
-        let Item { shape, index } = self.walk.tracer.shapes.numbered(id);
+    /// The triangle that the tree found.
+    fn triangle(&self, best: Best, (u, v): (f32, f32)) -> Hit {
+        let Item { shape, index } = self.walk.tracer.shapes.numbered(best.id);
         Hit {
-            t,
+            t: best.t,
             u,
             v,
             instance: self.way.instance,
@@ -228,36 +281,46 @@ impl<const ANY: bool> Party<'_, '_, '_, ANY> {
     }
 }
 
-impl<const ANY: bool> Walker for Party<'_, '_, '_, ANY> {
+impl<L: Ledger + ?Sized, const ANY: bool> Walker for Party<'_, '_, '_, L, ANY> {
     #[inline(always)]
     fn start(&self, ray: usize) -> Start {
         Start {
             ray: self.rays[ray],
             entry: self.way.entry,
-            best: self.best(&self.hits[ray]),
+            best: self.best(&self.ledger.hit(ray)),
         }
     }
 
     fn other(&mut self, ray: usize, item: u32, best: Best) -> Option<Best> {
-        if !matches!(best.place, Place::NOWHERE | Place::OUTSIDE) {
-            self.hits[ray] = self.triangle(best.t, best.id, (0.0, 0.0));
-        }
+        let mut hit = if best.is_inside() {
+            self.triangle(best, (0.0, 0.0))
+        } else {
+            self.ledger.hit(ray)
+        };
         let (from, item) = (self.rays[ray], self.group.items()[item as usize]);
         let (boxes, shear) = (RayBoxes::new(&from), Shear::new(&from));
-        let mut hit = self.hits[ray];
         let found = self
             .walk
             .item::<ANY>(&item, &from, (&boxes, &shear), self.way, &mut hit);
         found.then(|| {
-            self.hits[ray] = hit;
+            self.ledger.improve(ray, hit);
             self.best(&hit)
         })
     }
 
     #[inline(always)]
     fn end(&mut self, ray: usize, best: Best, uv: (f32, f32)) {
-        if !matches!(best.place, Place::NOWHERE | Place::OUTSIDE) {
-            self.hits[ray] = self.triangle(best.t, best.id, uv);
+        if best.is_inside() {
+            // Whoever wants any hit knows no number of it.
+            let hit = if ANY {
+                Hit {
+                    shape: 0,
+                    ..Hit::miss(best.t)
+                }
+            } else {
+                self.triangle(best, uv)
+            };
+            self.ledger.improve(ray, hit);
         }
     }
 }

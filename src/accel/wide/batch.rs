@@ -285,7 +285,7 @@ pub(super) unsafe fn batch<L: Lanes, W: Walker, const ANY: bool, const FETCH: bo
                 let ray = &mut *states.add(slot as usize);
                 places.others::<L, W, ANY>(ray, walker);
                 if ray.current == DONE {
-                    tree.end(walker, ray);
+                    tree.end::<W, ANY>(walker, ray);
                     if next == count {
                         continue;
                     }
@@ -337,5 +337,5 @@ pub(super) unsafe fn single<L: Lanes, W: Walker, const ANY: bool>(
             }
         }
     }
-    tree.end(walker, &ray);
+    tree.end::<W, ANY>(walker, &ray);
 }

@@ -16,6 +16,7 @@ use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 use rayon::prelude::*;
 
+use crate::accel::Build;
 use crate::shape::Bounds;
 
 /// The most levels of a binary tree.
@@ -30,12 +31,12 @@ pub(super) struct Binary {
 }
 
 /// The tree over these boxes; none over none.
-pub(super) fn binary(boxes: &[Bounds]) -> Option<Binary> {
+pub(super) fn binary(boxes: &[Bounds], work: Build) -> Option<Binary> {
     if boxes.is_empty() {
         return None;
     }
     let mut items = by_centre(boxes);
-    let mut tree = clustered(boxes, &mut items);
+    let mut tree = clustered(boxes, &mut items, work);
     tree.reorder_in_stack_traversal_order();
     if depth(&tree.nodes) > DEEPEST {
         let mut all: Vec<u32> = (0..boxes.len() as u32).collect();
@@ -94,7 +95,7 @@ fn aabb(bounds: &Bounds) -> Aabb {
     }
 }
 
-fn clustered(boxes: &[Bounds], runs: &mut Runs) -> Bvh2 {
+fn clustered(boxes: &[Bounds], runs: &mut Runs, work: Build) -> Bvh2 {
     let count = runs.starts.len();
     let ends = |run: usize| {
         runs.starts
@@ -121,14 +122,16 @@ fn clustered(boxes: &[Bounds], runs: &mut Runs) -> Bvh2 {
             }
         })
         .collect();
-    let mut tree = PlocBuilder::with_capacity(count).build(
-        PlocSearchDistance::Medium,
-        &aabbs,
-        (0..count as u32).collect(),
-        SortPrecision::U64,
-        0,
-    );
-    ReinsertionOptimizer::default().run(&mut tree, 0.02, None);
+    // As obvhs's own presets of these names, but for those of its steps that make leaves.
+    let (distance, precision, first_levels, share) = match work {
+        Build::Fast => (PlocSearchDistance::Low, SortPrecision::U64, 2, 0.02),
+        Build::Medium => (PlocSearchDistance::Medium, SortPrecision::U64, 3, 0.05),
+        Build::Slow => (PlocSearchDistance::High, SortPrecision::U128, 2, 0.2),
+    };
+    let indices = (0..count as u32).collect();
+    let mut tree =
+        PlocBuilder::with_capacity(count).build(distance, &aabbs, indices, precision, first_levels);
+    ReinsertionOptimizer::default().run(&mut tree, share, None);
     drop(aabbs);
     for node in 0..tree.nodes.len() {
         if tree.nodes[node].is_leaf() {

@@ -18,8 +18,8 @@ mod state;
 
 use glam::Vec3;
 
-use super::Counts;
 use super::triangle::Shear;
+use super::{Build, Counts};
 use crate::shape::Bounds;
 use node::{BLOCK, Block, Node};
 use state::State;
@@ -68,8 +68,8 @@ impl Default for Tree {
 impl Tree {
     /// A tree over items with these boxes, which are finite and not empty; and the items that are no
     /// triangles, in the order in which the walker is asked for them.
-    pub(super) fn build(boxes: &[Bounds], leaves: &impl Leaves) -> (Self, Vec<u32>) {
-        match build::binary(boxes) {
+    pub(super) fn build(boxes: &[Bounds], leaves: &impl Leaves, work: Build) -> (Self, Vec<u32>) {
+        match build::binary(boxes, work) {
             Some(binary) => collapse::collapse(&binary, leaves),
             None => Default::default(),
         }
@@ -120,10 +120,10 @@ impl Tree {
 
     /// Hands a ray that has been walked back to the walker.
     #[inline(always)]
-    fn end<W: Walker>(&self, walker: &mut W, ray: &State) {
+    fn end<W: Walker, const ANY: bool>(&self, walker: &mut W, ray: &State) {
         let best = ray.best();
         let mut uv = (0.0, 0.0);
-        if !matches!(best.place, Place::NOWHERE | Place::OUTSIDE) {
+        if !ANY && best.is_inside() {
             let block = &self.blocks[ray.place as usize / BLOCK];
             let corners = block.triangle(ray.place as usize % BLOCK);
             uv = Shear::barycentric(ray.shear().edges(corners));
@@ -134,3 +134,6 @@ impl Tree {
 
 /// Trees up to this size are in the caches nearest to a core, as far as counts.
 const CACHED: usize = 16 << 20;
+
+#[cfg(test)]
+mod tests;

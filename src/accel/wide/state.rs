@@ -27,6 +27,14 @@ pub(in crate::accel) struct Best {
     pub(in crate::accel) place: Place,
 }
 
+impl Best {
+    /// Whether it is a triangle of the tree that was walked.
+    #[inline(always)]
+    pub(in crate::accel) fn is_inside(&self) -> bool {
+        !matches!(self.place, Place::NOWHERE | Place::OUTSIDE)
+    }
+}
+
 /// Where the best hit is written down: nowhere, with whoever started the walk, or a triangle's block and
 /// lane in the tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
