@@ -24,7 +24,7 @@ mod tests;
 use glam::{DMat4, DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
-pub use generate::{bumpy_sphere, cube, grid, rectangle, sphere};
+pub use generate::{bumpy_sphere, cube, grid, hair, rectangle, sphere, terrain};
 pub use gltf::{GltfCamera, GltfPart, GltfScene, Projection, read_gltf};
 pub use mtl::BARE_COLOR;
 pub use read::{FORMATS, Format, Loaded, ReadOptions, read};

@@ -1,11 +1,17 @@
-//! Meshes without a file: Mitsuba's `rectangle` and `cube`, a parametrised sphere, a grid of heights, and a
-//! closed bumpy sphere of any size for tests and benches.
+//! Meshes without a file: Mitsuba's `rectangle` and `cube`, a parametrised sphere, a grid of heights, and of
+//! any size, for tests and benches, a closed bumpy sphere, a terrain and hair.
+
+mod hair;
+mod terrain;
 
 use std::collections::HashMap;
 use std::f64::consts::PI;
 
 use glam::{DVec2, DVec3, Vec2, Vec3};
 use rand::RngExt;
+
+pub use hair::hair;
+pub use terrain::terrain;
 
 use super::Mesh;
 use crate::math::random;
