@@ -74,8 +74,9 @@ impl Build {
     }
 }
 
-/// From how many rays a primitive on more work has paid for itself.
-const MEDIUM_PAYS: u64 = 50;
+/// From how many rays a primitive on more work has paid for itself: medium costs 0.12 µs a triangle more than
+/// fast and saves 1 % of a ray, slow 1.6 µs and 2.5 %.
+const MEDIUM_PAYS: u64 = 150;
 /// See `MEDIUM_PAYS`.
 const SLOW_PAYS: u64 = 800;
 

@@ -127,7 +127,7 @@ fn the_work_on_a_tree_changes_no_hit() {
 
 #[test]
 fn the_work_on_a_tree_follows_the_rays() {
-    let work = [0, 1_000, 100_000, 1_000_000].map(|rays| Build::suited(1000, rays));
+    let work = [0, 1_000, 200_000, 1_000_000].map(|rays| Build::suited(1000, rays));
     assert_eq!(work, [Build::Fast, Build::Fast, Build::Medium, Build::Slow]);
     assert_eq!(Build::suited(0, u64::MAX), Build::Slow);
 }
