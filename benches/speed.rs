@@ -115,8 +115,7 @@ fn occluded_shadow(bencher: Bencher<'_, '_>) {
     bencher
         .counter(ItemsCount::new(rays.len()))
         .bench_local(|| {
-            let rays = black_box(&rays).iter().copied();
-            tracer().occluded(rays, &mut blocked, &mut Counts::default());
+            tracer().occluded(black_box(&rays), &mut blocked, &mut Counts::default());
         });
 }
 

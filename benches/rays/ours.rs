@@ -47,7 +47,6 @@ impl Peer for Ours {
     }
 
     fn occluded(&self, rays: &[Ray], blocked: &mut Vec<bool>) {
-        let rays = rays.iter().copied();
         self.0.occluded(rays, blocked, &mut Counts::default());
     }
 }

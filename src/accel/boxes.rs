@@ -10,17 +10,18 @@ use crate::shape::Bounds;
 /// A ray prepared for boxes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RayBoxes {
-    origin: Vec3,
-    inverse: Vec3,
+    pub(super) origin: Vec3,
+    pub(super) inverse: Vec3,
 }
 
 /// 1 + 2γ₃, rounded up.
-const WIDEN: f32 = 1.000_000_5;
+pub(super) const WIDEN: f32 = 1.000_000_5;
 /// The smallest component of a direction that is inverted as it is; its inverse times any coordinate
 /// difference below 10¹⁸ stays finite.
 const SMALLEST: f32 = 1e-20;
 
 impl RayBoxes {
+    #[inline]
     pub(super) fn new(ray: &Ray) -> Self {
         let bounded = |d: f32| {
             if d.abs() < SMALLEST {

@@ -1,10 +1,14 @@
-//! A group of shapes with its tree: the items (primitives and instances) in the order of the leaves. What has
-//! no finite box stands beside the tree, in a short list that every ray is held against.
+//! A group of shapes with its tree. What has no finite box stands beside the tree, in a short list that
+//! every ray is held against.
 
-use crate::shape::Bounds;
+use std::sync::Arc;
 
-use super::Method;
-use super::tree::Tree;
+use glam::Vec3;
+
+use crate::shape::{Bounds, Geometry};
+
+use super::wide::{Leaves, Tree};
+use super::{Method, Recipe};
 
 /// A primitive of a shape, or an instance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -35,44 +39,118 @@ impl Item {
     }
 }
 
+/// The shapes of a scene, whose primitives are numbered through.
+#[derive(Debug)]
+pub(super) struct Shapes {
+    shapes: Vec<Arc<Geometry>>,
+    /// The number of each shape's first primitive.
+    starts: Vec<u32>,
+}
+
+impl Shapes {
+    pub(super) fn new(shapes: Vec<Arc<Geometry>>) -> Self {
+        let mut next = 0_u32;
+        let starts = shapes.iter().map(|shape| {
+            let start = next;
+            let after = next.checked_add(shape.primitive_count());
+            next = after.expect("fewer than 2³² primitives fit into memory");
+            start
+        });
+        Self {
+            starts: starts.collect(),
+            shapes,
+        }
+    }
+
+    /// A primitive's number.
+    #[inline]
+    pub(super) fn number(&self, item: Item) -> u32 {
+        self.starts[item.shape as usize] + item.index
+    }
+
+    /// The primitive with a number.
+    #[inline]
+    pub(super) fn numbered(&self, number: u32) -> Item {
+        // The last shape that starts there or before; empty ones before it start there too.
+        let shape = self.starts.partition_point(|start| *start <= number) - 1;
+        Item::primitive(shape as u32, number - self.starts[shape])
+    }
+
+    #[inline]
+    pub(super) fn get(&self, shape: u32) -> &Geometry {
+        &self.shapes[shape as usize]
+    }
+
+    pub(super) fn iter(&self) -> impl Iterator<Item = &Geometry> {
+        self.shapes.iter().map(|shape| &**shape)
+    }
+}
+
+/// What a tree is built over.
+struct Members<'a> {
+    items: &'a [Item],
+    shapes: &'a Shapes,
+}
+
+impl Leaves for Members<'_> {
+    fn is_triangle(&self, item: u32) -> bool {
+        let item = self.items[item as usize];
+        item.as_instance().is_none() && matches!(self.shapes.get(item.shape), Geometry::Mesh(_))
+    }
+
+    fn triangle(&self, item: u32) -> (u32, [Vec3; 3]) {
+        let item = self.items[item as usize];
+        match self.shapes.get(item.shape) {
+            Geometry::Mesh(mesh) => (self.shapes.number(item), mesh.corners(item.index)),
+            _ => unreachable!("the tree has asked whether it is a triangle"),
+        }
+    }
+}
+
 /// See the module.
 #[derive(Debug)]
 pub(super) struct Group {
     unbounded: Vec<Item>,
+    /// All others for brute force; those that are no triangles for a tree.
     items: Vec<Item>,
     tree: Tree,
     bounds: Bounds,
 }
 
 impl Group {
-    pub(super) fn new(placed: impl Iterator<Item = (Item, Bounds)>, method: Method) -> Self {
-        let (mut unbounded, mut items, mut boxes) = (Vec::new(), Vec::new(), Vec::new());
-        for (item, bounds) in placed {
-            if bounds.is_unbounded() {
-                unbounded.push(item);
-            } else {
+    /// A group of items in their boxes.
+    pub(super) fn new(
+        placed: impl Iterator<Item = (Item, Bounds)>,
+        recipe: Recipe,
+        shapes: &Shapes,
+    ) -> Self {
+        let is_finite = |b: &Bounds| b.min.is_finite() && b.max.is_finite();
+        let mut unbounded = Vec::new();
+        let (mut items, mut boxes) = (Vec::new(), Vec::new());
+        for (item, bounds) in placed.filter(|(_, bounds)| !bounds.is_empty()) {
+            if is_finite(&bounds) {
                 items.push(item);
                 boxes.push(bounds);
+            } else {
+                unbounded.push(item);
             }
         }
         let bounds = boxes.iter().copied().fold(Bounds::EMPTY, Bounds::union);
-        match method {
-            Method::Brute => Self {
-                unbounded,
-                items,
-                tree: Tree::default(),
-                bounds,
-            },
-            Method::Tree => {
-                let (tree, order) = Tree::build(&boxes);
-                let items = order.into_iter().map(|i| items[i as usize]).collect();
-                Self {
-                    unbounded,
-                    items,
-                    tree,
-                    bounds,
-                }
-            }
+        let mut tree = Tree::default();
+        if recipe.method == Method::Tree {
+            let others;
+            let members = Members {
+                items: &items,
+                shapes,
+            };
+            (tree, others) = Tree::build(&boxes, &members, recipe.build);
+            items = others.into_iter().map(|i| items[i as usize]).collect();
+        }
+        Self {
+            unbounded,
+            items,
+            tree,
+            bounds,
         }
     }
 
@@ -81,7 +159,7 @@ impl Group {
         &self.unbounded
     }
 
-    /// What the tree holds.
+    /// What the tree holds, for brute force; else those of it that are no triangles.
     pub(super) fn items(&self) -> &[Item] {
         &self.items
     }

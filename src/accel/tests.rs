@@ -39,28 +39,53 @@ fn rays(count: u32, targets: &[Vec3]) -> Vec<Ray> {
         .collect()
 }
 
-fn both(shapes: &[Arc<Geometry>], groups: &[u32], instances: &[Instance]) -> [Tracer; 2] {
-    [Method::Brute, Method::Tree]
-        .map(|m| Tracer::new(shapes.to_vec(), groups, instances.to_vec(), m))
+/// Brute force, and the tree walked by every kernel.
+fn all(shapes: &[Arc<Geometry>], groups: &[u32], instances: &[Instance]) -> Vec<Tracer> {
+    let tracer = |method, build| {
+        let recipe = Recipe { method, build };
+        Tracer::new(shapes.to_vec(), groups, instances.to_vec(), recipe)
+    };
+    let walked = Kernel::all().into_iter();
+    let trees = walked.map(|kernel| tracer(Method::Tree, Build::Medium).with_kernel(kernel));
+    [tracer(Method::Brute, Build::Medium)]
+        .into_iter()
+        .chain(trees)
+        .collect()
 }
 
-fn agree(tracers: &[Tracer; 2], rays: &[Ray]) -> usize {
-    let [mut a, mut b] = [Vec::new(), Vec::new()];
-    let mut counts = Counts::default();
-    tracers[0].closest(rays, &mut a, &mut counts);
-    tracers[1].closest(rays, &mut b, &mut counts);
-    assert_eq!(a, b);
-    let [mut c, mut d] = [Vec::new(), Vec::new()];
-    let limited = || {
-        rays.iter().enumerate().map(|(i, r)| Ray {
-            t_max: uniform(9, i as u32) * 3.0,
-            ..*r
-        })
+/// What all find alike: how many rays meet something.
+fn agree(tracers: &[Tracer], rays: &[Ray]) -> usize {
+    let limited = rays.iter().enumerate().map(|(i, r)| Ray {
+        t_max: r.t_max.min(uniform(9, i as u32) * 3.0),
+        ..*r
+    });
+    let limited: Vec<Ray> = limited.collect();
+    let found = |tracer: &Tracer| {
+        let (mut hits, mut limited_hits, mut blocked) = (Vec::new(), Vec::new(), Vec::new());
+        let mut counts = Counts::default();
+        tracer.closest(rays, &mut hits, &mut counts);
+        tracer.closest(&limited, &mut limited_hits, &mut counts);
+        tracer.occluded(&limited, &mut blocked, &mut counts);
+        for (hit, blocked) in limited_hits.iter().zip(&blocked) {
+            assert_eq!(*blocked, !hit.is_miss());
+        }
+        let bits = |hit: &Hit| {
+            let distances = [hit.t, hit.u, hit.v].map(f32::to_bits);
+            (distances, [hit.instance, hit.shape, hit.primitive])
+        };
+        let bits: Vec<_> = hits.iter().chain(&limited_hits).map(bits).collect();
+        let met = hits.iter().filter(|h| !h.is_miss()).count();
+        (bits, met, counts)
     };
-    tracers[0].occluded(limited(), &mut c, &mut counts);
-    tracers[1].occluded(limited(), &mut d, &mut counts);
-    assert_eq!(c, d);
-    a.iter().filter(|h| !h.is_miss()).count()
+    let brute = found(&tracers[0]);
+    let trees: Vec<_> = tracers[1..].iter().map(found).collect();
+    for (tracer, (bits, _, counts)) in tracers[1..].iter().zip(&trees) {
+        for (i, (a, b)) in brute.0.iter().zip(bits).enumerate() {
+            assert_eq!(a, b, "{} and brute force, ray {i}", tracer.kernel.name());
+        }
+        assert_eq!(*counts, trees[0].2, "{}", tracer.kernel.name());
+    }
+    brute.1
 }
 
 #[test]
@@ -80,8 +105,31 @@ fn the_tree_and_brute_force_find_the_same_hits_to_the_bit() {
             group: 1,
         },
     ];
-    let tracers = both(&shapes, &[0, 0, 1], &instances);
+    let tracers = all(&shapes, &[0, 0, 1], &instances);
     assert!(agree(&tracers, &rays(20_000, &targets)) > 10_000);
+}
+
+#[test]
+fn the_work_on_a_tree_changes_no_hit() {
+    let mesh = mesh::bumpy_sphere(5, 7);
+    let rays = rays(20_000, &mesh.positions);
+    let shapes = [Arc::new(Geometry::Mesh(TriangleMesh::new(mesh)))];
+    let found = [Build::Fast, Build::Medium, Build::Slow].map(|build| {
+        let method = Method::Tree;
+        let tracer = Tracer::new(shapes.to_vec(), &[0], Vec::new(), Recipe { method, build });
+        let (mut hits, mut counts) = (Vec::new(), Counts::default());
+        tracer.closest(&rays, &mut hits, &mut counts);
+        (hits, counts.node_steps)
+    });
+    assert!(found[0].0 == found[1].0 && found[1].0 == found[2].0);
+    assert!(found[0].1 != found[2].1, "the trees are one");
+}
+
+#[test]
+fn the_work_on_a_tree_follows_the_rays() {
+    let work = [0, 1_000, 200_000, 1_000_000].map(|rays| Build::suited(1000, rays));
+    assert_eq!(work, [Build::Fast, Build::Fast, Build::Medium, Build::Slow]);
+    assert_eq!(Build::suited(0, u64::MAX), Build::Slow);
 }
 
 #[test]
@@ -102,7 +150,7 @@ fn surfaces_with_equations_are_found_alike_in_the_world_and_in_instances() {
     let transform = DMat4::from_rotation_x(1.0) * DMat4::from_scale(DVec3::new(1.0, -0.5, 2.0));
     let to_world = Transform::new(&transform).unwrap();
     let instances = [Instance { to_world, group: 1 }];
-    let tracers = both(&twice, &[0, 0, 0, 0, 1, 1, 1, 1], &instances);
+    let tracers = all(&twice, &[0, 0, 0, 0, 1, 1, 1, 1], &instances);
     let rays = rays(20_000, &[Vec3::ZERO, Vec3::X, Vec3::new(0.0, 0.4, 0.5)]);
     assert!(agree(&tracers, &rays) > 10_000);
     for tracer in &tracers {
@@ -114,11 +162,110 @@ fn surfaces_with_equations_are_found_alike_in_the_world_and_in_instances() {
 #[test]
 fn scenes_of_nothing_and_of_one_triangle_can_be_traced() {
     let targets = [Vec3::ZERO];
-    assert_eq!(agree(&both(&[], &[], &[]), &rays(100, &targets)), 0);
+    assert_eq!(agree(&all(&[], &[], &[]), &rays(100, &targets)), 0);
     let mut one = mesh::rectangle();
     one.triangles.truncate(1);
     let shapes = [one, Mesh::default()].map(|m| Arc::new(Geometry::Mesh(TriangleMesh::new(m))));
-    assert!(agree(&both(&shapes, &[0, 0], &[]), &rays(1000, &targets)) > 10);
+    assert!(agree(&all(&shapes, &[0, 0], &[]), &rays(1000, &targets)) > 10);
+}
+
+/// Along axes and nearly so, from zero and from far off, with ends and directions of every size.
+fn odd_rays() -> Vec<Ray> {
+    let numbers = [
+        0.0,
+        -0.0,
+        1.0,
+        -1.0,
+        1e-30,
+        -1e-30,
+        1e-42,
+        0.3,
+        1e6,
+        f32::NAN,
+        f32::INFINITY,
+    ];
+    let ends = [f32::INFINITY, 1.0, 0.0, -1.0, 1e-30, f32::NAN];
+    let mut rays = Vec::new();
+    for i in 0..8000 {
+        let pick = |seed: u64| {
+            // Mostly numbers that can hit something.
+            let count = if uniform(seed + 20, i) < 0.05 {
+                numbers.len()
+            } else {
+                8
+            };
+            numbers[(uniform(seed, i) * count as f32) as usize]
+        };
+        rays.push(Ray {
+            origin: Vec3::new(pick(10), pick(11), pick(12)),
+            direction: Vec3::new(pick(13), pick(14), pick(15)),
+            t_max: ends[(uniform(16, i).powi(3) * ends.len() as f32) as usize],
+            time: 0.0,
+        });
+    }
+    rays
+}
+
+#[test]
+fn odd_rays_are_answered_alike_by_all() {
+    let sphere = mesh::bumpy_sphere(2, 5);
+    let grid: Vec<_> = [sphere, mesh::cube(), mesh::rectangle()]
+        .map(|m| Arc::new(Geometry::Mesh(TriangleMesh::new(m))))
+        .into();
+    let to_world = Transform::new(&DMat4::from_scale(DVec3::new(-1.0, 0.5, 0.25))).unwrap();
+    let instances = [Instance { to_world, group: 1 }];
+    assert!(agree(&all(&grid, &[0, 0, 1], &instances), &odd_rays()) > 800);
+}
+
+#[test]
+fn degenerate_triangles_and_sizes_of_all_kinds_are_traced_alike_by_all() {
+    let mut soup = Mesh::default();
+    for i in 0..2000 {
+        let size = 10f32.powi((i % 19) as i32 - 12);
+        let centre = direction(40, i) * uniform(41, i);
+        let corner = |k: u32| match i % 5 {
+            // Points, lines, flat ones, and triangles as they should be.
+            0 => centre,
+            1 => centre + (k as f32) * size * Vec3::X,
+            2 => centre + size * direction(42, 3 * i + k) * Vec3::new(1.0, 1.0, 0.0),
+            _ => centre + size * direction(42, 3 * i + k),
+        };
+        soup.positions.extend([0, 1, 2].map(corner));
+        soup.triangles.push([3 * i, 3 * i + 1, 3 * i + 2]);
+    }
+    let targets = soup.positions.clone();
+    for scale in [1e-18, 1.0, 1e15] {
+        let mut soup = soup.clone();
+        soup.transform(&DMat4::from_scale(DVec3::splat(scale)));
+        let rays: Vec<Ray> = (rays(2000, &targets).into_iter())
+            .map(|ray| Ray {
+                origin: ray.origin * scale as f32,
+                ..ray
+            })
+            .collect();
+        let shapes = [Arc::new(Geometry::Mesh(TriangleMesh::new(soup)))];
+        assert!(
+            agree(&all(&shapes, &[0], &[]), &rays) > 1000,
+            "scale {scale}"
+        );
+    }
+}
+
+#[test]
+fn nested_triangles_by_the_thousand_make_no_deep_tree() {
+    let mut nested = Mesh::default();
+    for i in 0..20_000 {
+        let size = 1.0 + 1e-3 * i as f32;
+        nested.positions.extend([
+            Vec3::new(-size, -size, 0.0),
+            Vec3::new(size, -size, 0.0),
+            Vec3::new(size, size, 0.0),
+        ]);
+        nested.triangles.push([3 * i, 3 * i + 1, 3 * i + 2]);
+    }
+    let shapes = vec![Arc::new(Geometry::Mesh(TriangleMesh::new(nested)))];
+    let tracer = Tracer::new(shapes, &[0], Vec::new(), Method::Tree);
+    assert!(tracer.groups[0].tree().levels() < 20);
 }
 
 #[test]
@@ -148,7 +295,7 @@ fn a_closed_mesh_has_no_hole_at_vertices_and_edges() {
         Vec::new(),
         Method::Tree,
     );
-    let n = 200_000;
+    let n = 2_000_000;
     let rays: Vec<Ray> = (0..n)
         .map(|i| {
             let corners = triangles[i as usize % triangles.len()].map(|v| positions[v as usize]);

@@ -12,13 +12,26 @@ use crate::interaction::Ray;
 /// that axis.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Shear {
-    origin: Vec3,
-    direction: Vec3,
-    axes: [usize; 3],
-    shear: [f32; 2],
+    pub(super) origin: Vec3,
+    pub(super) direction: Vec3,
+    pub(super) axes: [usize; 3],
+    pub(super) shear: [f32; 2],
+}
+
+/// The smaller, the second where they cannot be compared: as processors have it.
+#[inline(always)]
+pub(super) fn least(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
+/// The greater, the second where they cannot be compared.
+#[inline(always)]
+pub(super) fn greatest(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
 }
 
 impl Shear {
+    #[inline]
     pub(super) fn new(ray: &Ray) -> Self {
         let d = ray.direction.to_array();
         let magnitude = d.map(f32::abs);
@@ -30,10 +43,11 @@ impl Shear {
             2
         };
         // Winding is kept where the ray goes backwards along z.
+        let (after, before) = ([1, 2, 0][z], [2, 0, 1][z]);
         let (x, y) = if d[z] < 0.0 {
-            ((z + 2) % 3, (z + 1) % 3)
+            (before, after)
         } else {
-            ((z + 1) % 3, (z + 2) % 3)
+            (after, before)
         };
         Self {
             origin: ray.origin,
@@ -46,28 +60,49 @@ impl Shear {
     /// (t, u, v) with 0 < t ≤ `limit`; u and v are the second and third barycentric coordinates.
     #[inline]
     pub(super) fn intersect(&self, corners: [Vec3; 3], limit: f32) -> Option<(f32, f32, f32)> {
-        let [x, y, z] = self.axes;
-        let [a, b, c] = corners.map(|p| {
-            let p = (p - self.origin).to_array();
-            (p[x] - self.shear[0] * p[z], p[y] - self.shear[1] * p[z])
-        });
-        let u = c.0 * b.1 - c.1 * b.0;
-        let v = a.0 * c.1 - a.1 * c.0;
-        let w = b.0 * a.1 - b.1 * a.0;
-        if (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0) {
+        let edges = self.edges(corners);
+        if !Self::inside(edges) {
             return None;
         }
-        let determinant = u + v + w;
-        if determinant == 0.0 {
-            return None;
-        }
-        let inverse = 1.0 / determinant;
         let t = self.distance(corners);
-        (t > 0.0 && t <= limit).then_some((t, v * inverse, w * inverse))
+        let (u, v) = Self::barycentric(edges);
+        (t > 0.0 && t <= limit).then_some((t, u, v))
+    }
+
+    /// The edge functions: twice the areas that the ray and each edge span, in the sheared plane.
+    #[inline(always)]
+    pub(super) fn edges(&self, corners: [Vec3; 3]) -> [f32; 3] {
+        let [x, y, z] = self.axes;
+        let planar = |corner: Vec3| {
+            let p = (corner - self.origin).to_array();
+            (p[x] - self.shear[0] * p[z], p[y] - self.shear[1] * p[z])
+        };
+        let [a, b, c] = corners;
+        let (a, b, c) = (planar(a), planar(b), planar(c));
+        [
+            c.0 * b.1 - c.1 * b.0,
+            a.0 * c.1 - a.1 * c.0,
+            b.0 * a.1 - b.1 * a.0,
+        ]
+    }
+
+    /// Whether edge functions are all of one sign, where zero has both, and not all zero.
+    #[inline(always)]
+    pub(super) fn inside([u, v, w]: [f32; 3]) -> bool {
+        let (low, high) = (least(u, least(v, w)), greatest(u, greatest(v, w)));
+        (low >= 0.0) != (high <= 0.0)
+    }
+
+    /// The second and third barycentric coordinates.
+    #[inline(always)]
+    pub(super) fn barycentric([u, v, w]: [f32; 3]) -> (f32, f32) {
+        let inverse = 1.0 / (u + v + w);
+        (v * inverse, w * inverse)
     }
 
     /// Where the ray meets the triangle's plane.
-    fn distance(&self, corners: [Vec3; 3]) -> f32 {
+    #[inline(always)]
+    pub(super) fn distance(&self, corners: [Vec3; 3]) -> f32 {
         let origin = self.origin.as_dvec3();
         let [a, b, c] = corners.map(|p| p.as_dvec3() - origin);
         let normal = (b - a).cross(c - a);

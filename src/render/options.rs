@@ -4,7 +4,7 @@ use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::time::Duration;
 
-use crate::accel::Method;
+use crate::accel::{Build, Method};
 use crate::description::{Description, Kind, NodeId, Value};
 use crate::sensor::Window;
 
@@ -56,6 +56,8 @@ pub struct Options {
     pub adaptive: Option<Adaptive>,
     /// Tree or brute force.
     pub method: Method,
+    /// How much work goes into the tree; what suits the scene and the rays where absent.
+    pub build: Option<Build>,
     /// Which of the scene's sensors, in file order from 0.
     pub sensor: usize,
     /// Where the render is kept, so that it can be continued after an interruption.

@@ -11,7 +11,7 @@ use super::options::{Colors, Options};
 use super::plan::Completed;
 use super::progress::{Phase, Progress};
 use super::{Report, Seconds, timed};
-use crate::accel::Method;
+use crate::accel::{Build, Method, Recipe};
 use crate::color::ColorModel;
 use crate::description::{Description, Kind, NodeId, Properties};
 use crate::error::{Error, Problem, Problems, Result};
@@ -39,6 +39,7 @@ struct Key {
     scene: String,
     colors: Colors,
     method: Method,
+    build: Option<Build>,
 }
 
 /// What is known of a scene beside the scene.
@@ -152,12 +153,29 @@ pub(super) fn load(description: &Description, progress: &dyn Progress) -> Result
     Assets::load(description, &|| progress.advance(1, 0))
 }
 
+/// What the view says of the work to come.
+#[derive(Clone, Copy, Debug, Default)]
+struct Share {
+    /// Bytes of the film.
+    film: u64,
+    /// How many rays are to be expected.
+    rays: u64,
+}
+
+/// How many rays a film of so many samples a pixel takes, as a rule: paths of three bounces that each ask
+/// for light.
+fn rays(film: &Film, samples: u32) -> u64 {
+    const A_SAMPLE: u64 = 6;
+    let pixels = u64::from(film.crop.width) * u64::from(film.crop.height);
+    pixels.saturating_mul(u64::from(samples) * A_SAMPLE)
+}
+
 /// Loads the shapes and builds the scene, having made sure that there is room for it.
 fn make<C: ColorModel>(
     description: &Description,
     options: &Options,
     color: C,
-    film: u64,
+    Share { film, rays }: Share,
     progress: &dyn Progress,
 ) -> Result<(Scene<C>, Facts, Seconds)> {
     let mut seconds = Seconds::default();
@@ -185,7 +203,12 @@ fn make<C: ColorModel>(
     loaded.check(options.memory_limit)?;
     let scene = timed(&mut seconds.build, || {
         progress.begin(Phase::Build, 1);
-        scene::build(description, &assets, color, options.method)
+        let build = (options.build).unwrap_or_else(|| Build::suited(primitives, rays));
+        let recipe = Recipe {
+            method: options.method,
+            build,
+        };
+        scene::build(description, &assets, color, recipe)
     })?;
     progress.advance(1, 0);
     let facts = Facts {
@@ -212,13 +235,20 @@ pub(super) fn prepare<'k, C: ColorModel>(
         scene: fingerprint::scene_key(description),
         colors: options.colors,
         method: options.method,
+        build: options.build,
     };
     let sensor = problems.take(sensor(description, options));
     let view = sensor.and_then(|sensor| problems.take(view::<C>(description, sensor)));
-    let film = view.as_ref().map_or(0, |view| {
-        let channels = channels(&color, &view.integrator).len();
-        memory::film(&view.film, channels, options.adaptive.is_some())
+    let share = view.as_ref().map(|view| Share {
+        film: memory::film(
+            &view.film,
+            channels(&color, &view.integrator).len(),
+            options.adaptive.is_some(),
+        ),
+        rays: rays(&view.film, view.sampler.sample_count()),
     });
+    let share = share.unwrap_or_default();
+    let film = share.film;
     if kept.as_ref().is_some_and(|kept| kept.key == key) {
         // The equal scene was built from the equal properties, all of them.
         for property in description.root().all() {
@@ -226,7 +256,7 @@ pub(super) fn prepare<'k, C: ColorModel>(
         }
     } else {
         *kept = None;
-        let made = make(description, options, color, film, progress);
+        let made = make(description, options, color, share, progress);
         *kept = problems.take(made).map(|(scene, facts, spent)| Kept {
             key,
             scene: Box::new(scene),

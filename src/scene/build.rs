@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::assets::{MAX_SHAPES, Member};
 use super::choice::Choice;
 use super::{Assets, LightId, MaterialId, Scene, Surfacing};
-use crate::accel::{Method, Tracer};
+use crate::accel::{Recipe, Tracer};
 use crate::color::ColorModel;
 use crate::description::{Description, Kind, NodeId, Properties, Value};
 use crate::error::{Error, Problems, Result};
@@ -221,7 +221,7 @@ pub fn build<C: ColorModel>(
     description: &Description,
     assets: &Assets,
     color: C,
-    method: Method,
+    recipe: impl Into<Recipe>,
 ) -> Result<Scene<C>> {
     let mut builder = Builder {
         description,
@@ -266,7 +266,7 @@ pub fn build<C: ColorModel>(
         assets.shapes.iter().map(|s| s.geometry.clone()).collect(),
         &assets.shapes.iter().map(|s| s.group).collect::<Vec<_>>(),
         assets.instances.clone(),
-        method,
+        recipe,
     );
     let choice = Choice::new(&lights, &color, tracer.bounds());
     Ok(Scene {
@@ -286,6 +286,7 @@ mod tests {
     use std::path::Path;
 
     use super::*;
+    use crate::accel::Method;
     use crate::color::Rgb;
     use crate::description::Options;
 

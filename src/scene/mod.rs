@@ -103,7 +103,8 @@ impl<C: ColorModel> Scene<C> {
         blocked: &mut Vec<bool>,
         counts: &mut Counts,
     ) {
-        self.tracer.occluded(rays, blocked, counts);
+        let rays: Vec<Ray> = rays.collect();
+        self.tracer.occluded(&rays, blocked, counts);
     }
 
     /// What a hit looks like.

@@ -1,0 +1,326 @@
+//! One thread's way through the groups: batches through the world's tree, single rays through those of
+//! instances, every item in turn for brute force; and items that are no triangles, whoever asks.
+
+use std::cmp::Ordering;
+
+use crate::interaction::{Hit, Ray};
+use crate::shape::{Bounds, Geometry};
+
+use super::boxes::RayBoxes;
+use super::group::{Group, Item};
+use super::triangle::Shear;
+use super::wide::{Best, Flight, Place, Start, Walker};
+use super::{Counts, Instance, Method, Tracer, to_local};
+
+/// See the module.
+pub(super) struct Walk<'t> {
+    tracer: &'t Tracer,
+    counts: &'t mut Counts,
+    /// Room for walking an instance.
+    inner: Option<Flight>,
+}
+
+/// The way by which a group is met.
+#[derive(Clone, Copy, Debug)]
+struct Way {
+    group: u32,
+    /// The instance through which the group is met, or [`Hit::NONE`].
+    instance: u32,
+    /// Where the ray enters the instance's box.
+    entry: f32,
+}
+
+const WORLD: Way = Way {
+    group: 0,
+    instance: Hit::NONE,
+    entry: 0.0,
+};
+
+/// Whether a ray's numbers are such that it can meet anything.
+fn is_sound(ray: &Ray) -> bool {
+    ray.origin.is_finite() && ray.direction.is_finite() && ray.t_max >= 0.0
+}
+
+impl<'t> Walk<'t> {
+    pub(super) fn new(tracer: &'t Tracer, counts: &'t mut Counts) -> Self {
+        Self {
+            tracer,
+            counts,
+            inner: None,
+        }
+    }
+
+    /// Improves each ray's hit.
+    pub(super) fn closest(&mut self, rays: &[Ray], hits: &mut [Hit]) {
+        self.rays::<_, false>(WORLD, rays, hits);
+    }
+
+    /// Says of each ray whether anything lies on it.
+    pub(super) fn occluded(&mut self, rays: &[Ray], blocked: &mut [bool]) {
+        self.rays::<_, true>(WORLD, rays, &mut Shadows { rays, blocked });
+    }
+
+    /// Meets a group: improves each ray's hit; with `ANY`, by any that is there.
+    fn rays<L: Ledger + ?Sized, const ANY: bool>(
+        &mut self,
+        way: Way,
+        rays: &[Ray],
+        ledger: &mut L,
+    ) {
+        let tracer = self.tracer;
+        let group = &tracer.groups[way.group as usize];
+        if !group.unbounded().is_empty() {
+            self.items::<_, ANY>(way, group.unbounded(), rays, ledger);
+        }
+        if tracer.method == Method::Brute {
+            return self.items::<_, ANY>(way, group.items(), rays, ledger);
+        }
+        let (tree, kernel) = (group.tree(), tracer.kernel);
+        let mut counts = Counts::default();
+        let mut inner = self.inner.take();
+        let mut party = Party::<_, ANY> {
+            walk: self,
+            group,
+            way,
+            rays,
+            ledger,
+        };
+        if way.instance == Hit::NONE {
+            tree.batch::<_, ANY>(kernel, &mut party, rays.len(), &mut counts);
+        } else {
+            let flight = inner.get_or_insert_with(|| {
+                let levels = tracer.groups.iter().map(|group| group.tree().levels());
+                Flight::new(1, levels.max().unwrap_or(1))
+            });
+            tree.single::<_, ANY>(kernel, &mut party, flight, &mut counts);
+        }
+        self.inner = self.inner.take().or(inner);
+        self.counts.add(&counts);
+    }
+
+    /// Meets items one after another.
+    fn items<L: Ledger + ?Sized, const ANY: bool>(
+        &mut self,
+        way: Way,
+        items: &[Item],
+        rays: &[Ray],
+        ledger: &mut L,
+    ) {
+        for (i, ray) in rays.iter().enumerate().filter(|(_, ray)| is_sound(ray)) {
+            let (boxes, shear) = (RayBoxes::new(ray), Shear::new(ray));
+            let mut hit = ledger.hit(i);
+            for item in items {
+                let found = self.item::<ANY>(item, ray, (&boxes, &shear), way, &mut hit);
+                if found {
+                    ledger.improve(i, hit);
+                }
+                if found && ANY {
+                    break;
+                }
+            }
+        }
+    }
+
+    /// Meets one item of a group; whether it improved the hit.
+    fn item<const ANY: bool>(
+        &mut self,
+        item: &Item,
+        ray: &Ray,
+        (boxes, shear): (&RayBoxes, &Shear),
+        way: Way,
+        best: &mut Hit,
+    ) -> bool {
+        if let Some(instance) = item.as_instance() {
+            let Instance { to_world, group } = self.tracer.instances[instance as usize];
+            let bounds = &self.tracer.instance_bounds[instance as usize];
+            let Some(entry) = boxes.entry(bounds, best.t) else {
+                return false;
+            };
+            let way = Way {
+                group,
+                instance,
+                entry,
+            };
+            let before = *best;
+            let local = to_local(&to_world, ray);
+            self.rays::<[Hit], ANY>(way, &[local], std::slice::from_mut(best));
+            return *best != before;
+        }
+        self.counts.primitive_tests += 1;
+        let (t, u, v, bounds) = match self.tracer.shapes.get(item.shape) {
+            Geometry::Mesh(mesh) => {
+                let corners = mesh.corners(item.index);
+                let Some((t, u, v)) = shear.intersect(corners, best.t) else {
+                    return false;
+                };
+                let bounds = corners.into_iter().fold(Bounds::EMPTY, Bounds::with);
+                (t, u, v, bounds)
+            }
+            other => {
+                let limited = Ray {
+                    t_max: best.t,
+                    ..*ray
+                };
+                let Some((t, u, v)) = other.intersect(item.index, &limited) else {
+                    return false;
+                };
+                (t, u, v, other.bounds(item.index))
+            }
+        };
+        // Never before the boxes that lead here: so no order of walking can miss it.
+        let Some(own) = boxes.entry(&bounds, f32::INFINITY) else {
+            return false;
+        };
+        let hit = Hit {
+            t: t.max(own).max(way.entry),
+            u,
+            v,
+            instance: way.instance,
+            shape: item.shape,
+            primitive: item.index,
+        };
+        let better = hit.precedes(best);
+        if better {
+            *best = hit;
+        }
+        better
+    }
+}
+
+/// Where hits are written down.
+trait Ledger {
+    /// A ray's best hit so far; a miss says how far the ray goes.
+    fn hit(&self, ray: usize) -> Hit;
+    /// A better one.
+    fn improve(&mut self, ray: usize, hit: Hit);
+}
+
+impl Ledger for [Hit] {
+    #[inline(always)]
+    fn hit(&self, ray: usize) -> Hit {
+        self[ray]
+    }
+
+    #[inline(always)]
+    fn improve(&mut self, ray: usize, hit: Hit) {
+        self[ray] = hit;
+    }
+}
+
+/// Rays of which nobody asks more than whether they are blocked.
+struct Shadows<'a> {
+    rays: &'a [Ray],
+    blocked: &'a mut [bool],
+}
+
+impl Ledger for Shadows<'_> {
+    #[inline(always)]
+    fn hit(&self, ray: usize) -> Hit {
+        // What is blocked goes nowhere.
+        let end = if self.blocked[ray] {
+            f32::NEG_INFINITY
+        } else {
+            self.rays[ray].t_max
+        };
+        Hit::miss(end)
+    }
+
+    #[inline(always)]
+    fn improve(&mut self, ray: usize, _: Hit) {
+        self.blocked[ray] = true;
+    }
+}
+
+/// Rays that walk one group's tree together.
+struct Party<'w, 't, 'r, L: ?Sized, const ANY: bool> {
+    walk: &'w mut Walk<'t>,
+    group: &'t Group,
+    way: Way,
+    rays: &'r [Ray],
+    ledger: &'r mut L,
+}
+
+impl<L: Ledger + ?Sized, const ANY: bool> Party<'_, '_, '_, L, ANY> {
+    /// A hit as the tree knows it. At an equal distance the one of the lower instance comes first, which
+    /// the tree is told by numbers that all or none of its triangles are below.
+    #[inline(always)]
+    fn best(&self, hit: &Hit) -> Best {
+        if hit.is_miss() {
+            return Best {
+                t: hit.t,
+                id: u32::MAX,
+                place: Place::NOWHERE,
+            };
+        }
+        let id = match hit.instance.cmp(&self.way.instance) {
+            Ordering::Less => 0,
+            Ordering::Greater => u32::MAX,
+            Ordering::Equal => {
+                let item = Item::primitive(hit.shape, hit.primitive);
+                self.walk.tracer.shapes.number(item)
+            }
+        };
+        Best {
+            t: hit.t,
+            id,
+            place: Place::OUTSIDE,
+        }
+    }
+
+    /// The triangle that the tree found.
+    fn triangle(&self, best: Best, (u, v): (f32, f32)) -> Hit {
+        let Item { shape, index } = self.walk.tracer.shapes.numbered(best.id);
+        Hit {
+            t: best.t,
+            u,
+            v,
+            instance: self.way.instance,
+            shape,
+            primitive: index,
+        }
+    }
+}
+
+impl<L: Ledger + ?Sized, const ANY: bool> Walker for Party<'_, '_, '_, L, ANY> {
+    #[inline(always)]
+    fn start(&self, ray: usize) -> Start {
+        Start {
+            ray: self.rays[ray],
+            entry: self.way.entry,
+            best: self.best(&self.ledger.hit(ray)),
+        }
+    }
+
+    fn other(&mut self, ray: usize, item: u32, best: Best) -> Option<Best> {
+        let mut hit = if best.is_inside() {
+            self.triangle(best, (0.0, 0.0))
+        } else {
+            self.ledger.hit(ray)
+        };
+        let (from, item) = (self.rays[ray], self.group.items()[item as usize]);
+        let (boxes, shear) = (RayBoxes::new(&from), Shear::new(&from));
+        let found = self
+            .walk
+            .item::<ANY>(&item, &from, (&boxes, &shear), self.way, &mut hit);
+        found.then(|| {
+            self.ledger.improve(ray, hit);
+            self.best(&hit)
+        })
+    }
+
+    #[inline(always)]
+    fn end(&mut self, ray: usize, best: Best, uv: (f32, f32)) {
+        if best.is_inside() {
+            // Whoever wants any hit knows no number of it.
+            let hit = if ANY {
+                Hit {
+                    shape: 0,
+                    ..Hit::miss(best.t)
+                }
+            } else {
+                self.triangle(best, uv)
+            };
+            self.ledger.improve(ray, hit);
+        }
+    }
+}

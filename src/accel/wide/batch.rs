@@ -1,0 +1,341 @@
+//! Walking the tree: many rays in flight, or one.
+//!
+//! A walk is a chain of loads that wait for each other, and of branches that nobody can foretell. So a
+//! batch keeps dozens of rays on their way and takes them in rounds: all that are at a node go a step,
+//! then all that are at a block. Within a round nothing depends on what another ray found, and nothing
+//! branches on it: each ray is written to the end of every list, and only the list that it belongs to
+//! grows.
+
+#![allow(unsafe_code)]
+
+use std::hint::select_unpredictable;
+
+use super::kernel::Lanes;
+use super::node::{BLOCK_INDEX, DONE, LEAF, OTHER, OTHER_INDEX, WIDTH, triangles_of};
+use super::state::{Best, Flight, State};
+use super::{Tree, Walker};
+use crate::accel::Counts;
+
+/// Rays on their way at once. Fewer wait for memory, more fall out of the nearest cache.
+pub(super) const IN_FLIGHT: usize = 48;
+
+/// Rays by what they do next, as slots.
+struct Lists {
+    nodes: [[u32; IN_FLIGHT]; 2],
+    leaves: [[u32; IN_FLIGHT]; 2],
+    inside: [u32; IN_FLIGHT],
+    rest: [u32; IN_FLIGHT],
+}
+
+/// The ends of the lists to which a round writes.
+struct Ends {
+    nodes: *mut u32,
+    leaves: *mut u32,
+    rest: *mut u32,
+}
+
+impl Ends {
+    /// Puts a ray where `current` belongs, or nowhere where `wanted` is not.
+    ///
+    /// # Safety
+    /// Each list has room for one more.
+    #[inline(always)]
+    unsafe fn file(&mut self, slot: u32, current: u32, wanted: bool) {
+        let leaf = current >= LEAF;
+        let rest = current >= OTHER;
+        // SAFETY: the caller says that there is room.
+        unsafe {
+            *self.nodes = slot;
+            *self.leaves = slot;
+            *self.rest = slot;
+            self.nodes = self.nodes.add(usize::from(!leaf & wanted));
+            self.leaves = self.leaves.add(usize::from((leaf ^ rest) & wanted));
+            self.rest = self.rest.add(usize::from(rest & wanted));
+        }
+    }
+}
+
+/// The tree and the stacks, by pointers.
+#[derive(Clone, Copy)]
+struct Places<'t> {
+    tree: &'t Tree,
+    distances: *mut f32,
+    references: *mut u32,
+}
+
+impl Places<'_> {
+    /// Enters a node: its children go onto the stack, and the nearest comes from it. Where there is none,
+    /// the next comes from below.
+    ///
+    /// # Safety
+    /// The ray is at a node of the tree, its stack is in its place, and the processor has `L`.
+    #[inline(always)]
+    unsafe fn step<L: Lanes, const ANY: bool>(self, ray: &mut State) {
+        let top = ray.top as usize;
+        // SAFETY: below the top are eight sentinels at least, above it room for eight children.
+        unsafe {
+            // Looked for before the children are written: reading what was just written in pieces is slow.
+            let below = if ANY {
+                top as u32 - 1
+            } else {
+                self.below::<L>(ray)
+            };
+            let node = self.tree.nodes.get_unchecked(ray.current as usize);
+            let (distances, references) = (self.distances.add(top), self.references.add(top));
+            let count = L::enter::<ANY>(node, ray, distances, references);
+            ray.top = select_unpredictable(count == 0, below, top as u32 + count - 1);
+            ray.current = *self.references.add(ray.top as usize);
+        }
+    }
+
+    /// The highest place on the stack that is not beyond the limit, among eight.
+    ///
+    /// # Safety
+    /// As [`Places::step`].
+    #[inline(always)]
+    unsafe fn below<L: Lanes>(self, ray: &State) -> u32 {
+        let lowest = ray.top - WIDTH as u32;
+        // SAFETY: eight sentinels are at the bottom.
+        lowest + unsafe { L::pop(self.distances.add(lowest as usize), ray.limit) }
+    }
+
+    /// What comes next where the present leads nowhere.
+    ///
+    /// # Safety
+    /// As [`Places::step`].
+    #[inline(always)]
+    unsafe fn next<L: Lanes, const ANY: bool>(self, ray: &State) -> (u32, u32) {
+        // SAFETY: as for `step`.
+        unsafe {
+            let top = if ANY {
+                ray.top - 1
+            } else {
+                self.below::<L>(ray)
+            };
+            (top, *self.references.add(top as usize))
+        }
+    }
+
+    /// The block that the ray is at: a bit for each triangle that its line goes through.
+    ///
+    /// # Safety
+    /// The ray is at a block of the tree, and the processor has `L`.
+    #[inline(always)]
+    unsafe fn inside<L: Lanes>(self, ray: &mut State) -> u32 {
+        let index = (ray.current & BLOCK_INDEX) as usize;
+        // SAFETY: the index is a block's.
+        ray.lanes = unsafe { L::inside(self.tree.blocks.get_unchecked(index), ray) };
+        ray.lanes
+    }
+
+    /// Takes the best of the triangles that the line goes through; whether the ray is blocked.
+    ///
+    /// # Safety
+    /// As [`Places::inside`].
+    #[inline(always)]
+    unsafe fn meet<L: Lanes, const ANY: bool>(self, ray: &mut State) -> bool {
+        let index = ray.current & BLOCK_INDEX;
+        // SAFETY: the index is a block's.
+        let block = unsafe { self.tree.blocks.get_unchecked(index as usize) };
+        // SAFETY: the caller has what `L` needs.
+        let (t, lane) = unsafe { L::meet(block, ray) };
+        let id = block.ids[lane];
+        let better = (t < ray.limit) | ((t == ray.limit) & (id < ray.id));
+        if !ANY {
+            ray.limit = select_unpredictable(better, t, ray.limit);
+            ray.id = select_unpredictable(better, id, ray.id);
+        }
+        ray.place = select_unpredictable(better, index << 2 | lane as u32, ray.place);
+        ANY & better
+    }
+
+    /// Deals with rays at items that are no triangles, until each is at a node or a block, or done.
+    ///
+    /// # Safety
+    /// As [`Places::step`].
+    #[inline(always)]
+    unsafe fn others<L: Lanes, W: Walker, const ANY: bool>(self, ray: &mut State, walker: &mut W) {
+        while ray.current >= OTHER && ray.current != DONE {
+            let item = ray.current & OTHER_INDEX;
+            let found = walker.other(ray.ray as usize, item, ray.best());
+            if let Some(Best { t, id, place }) = found {
+                (ray.limit, ray.id, ray.place) = (t, id, place.0);
+            }
+            if ANY && found.is_some() {
+                ray.current = DONE;
+                return;
+            }
+            // SAFETY: as for `step`.
+            (ray.top, ray.current) = unsafe { self.next::<L, ANY>(ray) };
+        }
+    }
+
+    /// Asks for what the ray will need in the next round.
+    #[inline(always)]
+    fn fetch(self, current: u32) {
+        #[cfg(target_arch = "x86_64")]
+        {
+            use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+            let index = (current & BLOCK_INDEX) as usize;
+            let node = self.tree.nodes.as_ptr().wrapping_add(current as usize);
+            let block = self.tree.blocks.as_ptr().wrapping_add(index);
+            let at = select_unpredictable(current >= LEAF, block.cast::<i8>(), node.cast());
+            for line in 0..4 {
+                // SAFETY: a hint never faults, wherever it points.
+                unsafe { _mm_prefetch::<_MM_HINT_T0>(at.wrapping_add(64 * line)) };
+            }
+        }
+    }
+}
+
+fn places<'t>(tree: &'t Tree, flight: &mut Flight) -> Places<'t> {
+    Places {
+        tree,
+        distances: flight.distances.as_mut_ptr(),
+        references: flight.references.as_mut_ptr(),
+    }
+}
+
+/// Walks `count` rays.
+///
+/// # Safety
+/// The processor has the instructions of `L`, and `flight` was made for trees of this one's levels.
+#[inline(always)]
+pub(super) unsafe fn batch<L: Lanes, W: Walker, const ANY: bool, const FETCH: bool>(
+    tree: &Tree,
+    walker: &mut W,
+    count: usize,
+    flight: &mut Flight,
+    counts: &mut Counts,
+) {
+    let places = places(tree, flight);
+    let slots = flight.states.len().min(count).min(IN_FLIGHT);
+    let mut lists = Lists {
+        nodes: [[0; IN_FLIGHT]; 2],
+        leaves: [[0; IN_FLIGHT]; 2],
+        inside: [0; IN_FLIGHT],
+        rest: [0; IN_FLIGHT],
+    };
+    let bottoms: [u32; IN_FLIGHT] = std::array::from_fn(|slot| flight.bottom(slot));
+    let states = flight.states.as_mut_ptr();
+    for (slot, state) in flight.states.iter_mut().enumerate().take(slots) {
+        state.begin(slot as u32, &walker.start(slot), bottoms[slot]);
+        lists.nodes[0][slot] = slot as u32;
+    }
+    let (mut next, mut node_count, mut leaf_count) = (slots, slots, 0);
+    let (mut node_steps, mut triangle_tests) = (0, 0);
+    // SAFETY: every slot is on one list at a time, so none outgrows its array; rays at a node, a block or
+    // an item are at one of this tree; stacks have room for its levels.
+    unsafe {
+        let node_lists = lists.nodes.as_mut_ptr();
+        let leaf_lists = lists.leaves.as_mut_ptr();
+        let (mut nodes, mut later_nodes) = (node_lists, node_lists.add(1));
+        let (mut leaves, mut later_leaves) = (leaf_lists, leaf_lists.add(1));
+        let rest = lists.rest.as_mut_ptr();
+        let inside = lists.inside.as_mut_ptr();
+        while node_count + leaf_count > 0 {
+            node_steps += node_count as u64;
+            let mut ends = Ends {
+                nodes: later_nodes.cast(),
+                leaves: leaves.cast::<u32>().add(leaf_count),
+                rest,
+            };
+            for i in 0..node_count {
+                let slot = *nodes.cast::<u32>().add(i);
+                let ray = &mut *states.add(slot as usize);
+                places.step::<L, ANY>(ray);
+                ends.file(slot, ray.current, true);
+                if FETCH {
+                    places.fetch(ray.current);
+                }
+            }
+            leaf_count = ends.leaves.offset_from(leaves.cast()) as usize;
+            ends.leaves = later_leaves.cast();
+            let mut inside_count = 0;
+            for i in 0..leaf_count {
+                let slot = *leaves.cast::<u32>().add(i);
+                let ray = &mut *states.add(slot as usize);
+                triangle_tests += triangles_of(ray.current);
+                let hit = places.inside::<L>(ray) != 0;
+                *inside.add(inside_count) = slot;
+                inside_count += usize::from(hit);
+                let (top, current) = places.next::<L, ANY>(ray);
+                ray.top = select_unpredictable(hit, ray.top, top);
+                ray.current = select_unpredictable(hit, ray.current, current);
+                ends.file(slot, ray.current, !hit);
+                if FETCH {
+                    places.fetch(ray.current);
+                }
+            }
+            for i in 0..inside_count {
+                let slot = *inside.add(i);
+                let ray = &mut *states.add(slot as usize);
+                let blocked = places.meet::<L, ANY>(ray);
+                let (top, current) = places.next::<L, ANY>(ray);
+                ray.top = top;
+                ray.current = select_unpredictable(blocked, DONE, current);
+                ends.file(slot, ray.current, true);
+                if FETCH {
+                    places.fetch(ray.current);
+                }
+            }
+            let rest_count = ends.rest.offset_from(rest) as usize;
+            for i in 0..rest_count {
+                let slot = *rest.add(i);
+                let ray = &mut *states.add(slot as usize);
+                places.others::<L, W, ANY>(ray, walker);
+                if ray.current == DONE {
+                    tree.end::<W, ANY>(walker, ray);
+                    if next == count {
+                        continue;
+                    }
+                    ray.begin(next as u32, &walker.start(next), bottoms[slot as usize]);
+                    next += 1;
+                }
+                ends.rest = rest;
+                ends.file(slot, ray.current, true);
+            }
+            node_count = ends.nodes.offset_from(later_nodes.cast()) as usize;
+            leaf_count = ends.leaves.offset_from(later_leaves.cast()) as usize;
+            (nodes, later_nodes) = (later_nodes, nodes);
+            (leaves, later_leaves) = (later_leaves, leaves);
+        }
+    }
+    counts.node_steps += node_steps;
+    counts.primitive_tests += u64::from(triangle_tests);
+}
+
+/// Walks one ray.
+///
+/// # Safety
+/// As [`batch`].
+#[inline(always)]
+pub(super) unsafe fn single<L: Lanes, W: Walker, const ANY: bool>(
+    tree: &Tree,
+    walker: &mut W,
+    flight: &mut Flight,
+    counts: &mut Counts,
+) {
+    let places = places(tree, flight);
+    let mut ray = State::IDLE;
+    ray.begin(0, &walker.start(0), flight.bottom(0));
+    // SAFETY: as for `batch`.
+    unsafe {
+        while ray.current != DONE {
+            if ray.current < LEAF {
+                counts.node_steps += 1;
+                places.step::<L, ANY>(&mut ray);
+            } else if ray.current < OTHER {
+                counts.primitive_tests += u64::from(triangles_of(ray.current));
+                let blocked = places.inside::<L>(&mut ray) != 0 && places.meet::<L, ANY>(&mut ray);
+                (ray.top, ray.current) = places.next::<L, ANY>(&ray);
+                if blocked {
+                    break;
+                }
+            } else {
+                places.others::<L, W, ANY>(&mut ray, walker);
+            }
+        }
+    }
+    tree.end::<W, ANY>(walker, &ray);
+}

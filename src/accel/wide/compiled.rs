@@ -1,0 +1,103 @@
+//! The walks, compiled for each set of instructions, and the choice between them: once a batch.
+
+#![allow(unsafe_code)]
+
+use super::batch as walks;
+use super::kernel::{Kernel, Set};
+use super::portable::Portable;
+use super::{Flight, Tree, Walker};
+use crate::accel::Counts;
+
+/// Walks `count` rays; with `FETCH`, asks for memory ahead.
+pub(super) fn batch<W: Walker, const ANY: bool, const FETCH: bool>(
+    Kernel(set): Kernel,
+    tree: &Tree,
+    walker: &mut W,
+    count: usize,
+    flight: &mut Flight,
+    counts: &mut Counts,
+) {
+    assert!(flight.levels() >= tree.levels(), "room for the tree");
+    // SAFETY: a `Kernel` exists only where the processor has its instructions, and there is room.
+    unsafe {
+        match set {
+            Set::Portable => {
+                walks::batch::<Portable, W, ANY, FETCH>(tree, walker, count, flight, counts);
+            }
+            #[cfg(target_arch = "x86_64")]
+            Set::Avx2 => avx2::batch::<W, ANY, FETCH>(tree, walker, count, flight, counts),
+            #[cfg(target_arch = "x86_64")]
+            Set::Avx512 => avx512::batch::<W, ANY, FETCH>(tree, walker, count, flight, counts),
+        }
+    }
+}
+
+/// Walks one ray.
+pub(super) fn single<W: Walker, const ANY: bool>(
+    Kernel(set): Kernel,
+    tree: &Tree,
+    walker: &mut W,
+    flight: &mut Flight,
+    counts: &mut Counts,
+) {
+    assert!(flight.levels() >= tree.levels(), "room for the tree");
+    // SAFETY: as for `batch`.
+    unsafe {
+        match set {
+            Set::Portable => walks::single::<Portable, W, ANY>(tree, walker, flight, counts),
+            #[cfg(target_arch = "x86_64")]
+            Set::Avx2 => avx2::single::<W, ANY>(tree, walker, flight, counts),
+            #[cfg(target_arch = "x86_64")]
+            Set::Avx512 => avx512::single::<W, ANY>(tree, walker, flight, counts),
+        }
+    }
+}
+
+/// A module with both walks, compiled for some instructions.
+#[cfg(target_arch = "x86_64")]
+macro_rules! compile {
+    ($name:ident, $lanes:ident, $features:literal) => {
+        mod $name {
+            use super::super::avx::$lanes;
+            use super::{Counts, Flight, Tree, Walker, walks};
+
+            /// # Safety
+            /// As for the walk itself.
+            #[target_feature(enable = $features)]
+            pub(super) unsafe fn batch<W: Walker, const ANY: bool, const FETCH: bool>(
+                tree: &Tree,
+                walker: &mut W,
+                count: usize,
+                flight: &mut Flight,
+                counts: &mut Counts,
+            ) {
+                // SAFETY: the caller's word.
+                unsafe {
+                    walks::batch::<$lanes, W, ANY, FETCH>(tree, walker, count, flight, counts)
+                }
+            }
+
+            /// # Safety
+            /// As for the walk itself.
+            #[target_feature(enable = $features)]
+            pub(super) unsafe fn single<W: Walker, const ANY: bool>(
+                tree: &Tree,
+                walker: &mut W,
+                flight: &mut Flight,
+                counts: &mut Counts,
+            ) {
+                // SAFETY: the caller's word.
+                unsafe { walks::single::<$lanes, W, ANY>(tree, walker, flight, counts) }
+            }
+        }
+    };
+}
+
+#[cfg(target_arch = "x86_64")]
+compile!(avx2, Avx2, "avx2,bmi1,bmi2,lzcnt,popcnt");
+#[cfg(target_arch = "x86_64")]
+compile!(
+    avx512,
+    Avx512,
+    "avx512f,avx512vl,avx512dq,avx512bw,avx2,bmi1,bmi2,lzcnt,popcnt"
+);

@@ -1,0 +1,128 @@
+//! What the wide tree is made of: nodes with up to eight children, and blocks of up to four triangles.
+//! Both are plain arrays, one lane a child or a triangle, as the kernels load them.
+//!
+//! A child is named by 32 bits: a node's index; or bit 31, the number of triangles less one (2 bits from
+//! bit 28) and a block's index; or bits 31 and 30 and the index of an item that is no triangle.
+
+use glam::Vec3;
+
+use crate::shape::Bounds;
+
+/// Children of a node.
+pub(super) const WIDTH: usize = 8;
+/// Triangles of a block.
+pub(super) const BLOCK: usize = 4;
+
+/// Names a block rather than a node.
+pub(super) const LEAF: u32 = 1 << 31;
+/// With [`LEAF`]: names an item that is no triangle.
+pub(super) const OTHER: u32 = LEAF | 1 << 30;
+/// Nothing is left to be visited.
+pub(super) const DONE: u32 = u32::MAX;
+const COUNT_SHIFT: u32 = 28;
+/// The index of a block in its name.
+pub(super) const BLOCK_INDEX: u32 = (1 << COUNT_SHIFT) - 1;
+/// The index of an item that is no triangle in its name.
+pub(super) const OTHER_INDEX: u32 = !OTHER;
+
+/// How many triangles a named block holds.
+#[inline(always)]
+pub(super) fn triangles_of(name: u32) -> u32 {
+    (name >> COUNT_SHIFT & 3) + 1
+}
+
+/// A node: its children's boxes and names.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+pub(super) struct Node {
+    /// Smallest x, largest x, smallest y, and so on. A lane without a child has its smallest above its
+    /// largest, at the infinities.
+    pub(super) slabs: [[f32; WIDTH]; 6],
+    pub(super) children: [u32; WIDTH],
+    /// In which order to look at the lanes, farthest first: three bits for each octant of directions.
+    pub(super) order: [u32; WIDTH],
+}
+
+impl Node {
+    pub(super) const EMPTY: Self = {
+        let (low, high) = ([f32::INFINITY; WIDTH], [f32::NEG_INFINITY; WIDTH]);
+        Self {
+            slabs: [low, high, low, high, low, high],
+            children: [DONE; WIDTH],
+            order: [0; WIDTH],
+        }
+    };
+
+    /// A node over children that are given by their boxes; they are named later.
+    pub(super) fn new(boxes: &[Bounds]) -> Self {
+        let mut node = Self::EMPTY;
+        for (lane, Bounds { min, max }) in boxes.iter().enumerate() {
+            for axis in 0..3 {
+                node.slabs[2 * axis][lane] = min[axis];
+                node.slabs[2 * axis + 1][lane] = max[axis];
+            }
+        }
+        for octant in 0..8 {
+            let sign = |bit: usize| if octant >> bit & 1 == 1 { -1.0 } else { 1.0 };
+            let toward = Vec3::new(sign(0), sign(1), sign(2));
+            // The scale by 1/4 keeps sums finite.
+            let depth = |lane: usize| match boxes.get(lane) {
+                Some(Bounds { min, max }) => toward.dot(0.25 * *min + 0.25 * *max),
+                None => f32::INFINITY,
+            };
+            let mut lanes: [usize; WIDTH] = std::array::from_fn(|lane| lane);
+            lanes.sort_by(|a, b| depth(*b).total_cmp(&depth(*a)));
+            for (place, lane) in lanes.into_iter().enumerate() {
+                node.order[place] |= (lane as u32) << (3 * octant);
+            }
+        }
+        node
+    }
+}
+
+/// Up to four triangles. Lanes are in the order of the ids.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(32))]
+pub(super) struct Block {
+    /// By axis, corner and lane; not a number where there is no triangle.
+    pub(super) corners: [[[f32; BLOCK]; 3]; 3],
+    /// Each triangle's number in its scene.
+    pub(super) ids: [u32; BLOCK],
+}
+
+impl Block {
+    /// A block of triangles, each with its number; one to four.
+    pub(super) fn new(triangles: &mut [(u32, [Vec3; 3])]) -> Self {
+        triangles.sort_unstable_by_key(|(id, _)| *id);
+        let mut block = Self {
+            corners: [[[f32::NAN; BLOCK]; 3]; 3],
+            ids: [u32::MAX; BLOCK],
+        };
+        for (lane, (id, corners)) in triangles.iter().enumerate() {
+            block.ids[lane] = *id;
+            for axis in 0..3 {
+                for (corner, position) in corners.iter().enumerate() {
+                    block.corners[axis][corner][lane] = position[axis];
+                }
+            }
+        }
+        block
+    }
+
+    /// The name of a block.
+    pub(super) fn name(index: usize, triangles: usize) -> u32 {
+        assert!(
+            index < BLOCK_INDEX as usize,
+            "a tree of fewer than 2²⁸ blocks"
+        );
+        LEAF | (triangles as u32 - 1) << COUNT_SHIFT | index as u32
+    }
+
+    /// A triangle's corners.
+    #[inline(always)]
+    pub(super) fn triangle(&self, lane: usize) -> [Vec3; 3] {
+        let [x, y, z] = &self.corners;
+        let corner = |c: usize| Vec3::new(x[c][lane], y[c][lane], z[c][lane]);
+        [corner(0), corner(1), corner(2)]
+    }
+}
