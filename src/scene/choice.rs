@@ -18,7 +18,7 @@ pub(super) struct Choice {
 }
 
 /// The part of the choices that does not look at power.
-const EVEN: f64 = 0.25;
+const EVEN: f64 = 0.5;
 
 impl Choice {
     pub(super) fn new<C: ColorModel>(lights: &[Light<C>], color: &C, bounds: Bounds) -> Self {
