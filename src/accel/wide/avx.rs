@@ -129,16 +129,14 @@ unsafe impl<P: Pack> Lanes for P {
             }
             let far = _mm256_mul_ps(far, _mm256_set1_ps(WIDEN));
             let far = _mm256_min_ps(far, _mm256_set1_ps(ray.limit));
-            // What is missed becomes no number before the lanes are put in order: three permutations, where
-            // permuting both distances made the compiler permute constants as well, six.
-            let missed = _mm256_cmp_ps::<_CMP_NLE_UQ>(near, far);
-            let near = _mm256_or_ps(near, missed);
+            // Comparing before the lanes are put in order saves permutations and was no faster.
             let order = _mm256_load_si256(node.order.as_ptr().cast());
             let order = _mm256_srlv_epi32(order, _mm256_set1_epi32(ray.octant as i32));
             let near = _mm256_permutevar8x32_ps(near, order);
+            let far = _mm256_permutevar8x32_ps(far, order);
             let children = _mm256_load_si256(node.children.as_ptr().cast());
             let children = _mm256_permutevar8x32_epi32(children, order);
-            let mask = P::at_most(near, _mm256_set1_ps(f32::INFINITY));
+            let mask = P::at_most(near, far);
             let (children, near) = P::pack(mask, children, near);
             _mm256_storeu_si256(references.cast(), children);
             if !ANY {
