@@ -106,7 +106,7 @@ fn the_tree_and_brute_force_find_the_same_hits_to_the_bit() {
         },
     ];
     let tracers = all(&shapes, &[0, 0, 1], &instances);
-    assert!(agree(&tracers, &rays(20_000, &targets)) > 10_000);
+    assert!(agree(&tracers, &rays(6000, &targets)) > 3000);
 }
 
 #[test]
@@ -237,7 +237,7 @@ fn degenerate_triangles_and_sizes_of_all_kinds_are_traced_alike_by_all() {
     for scale in [1e-18, 1.0, 1e15] {
         let mut soup = soup.clone();
         soup.transform(&DMat4::from_scale(DVec3::splat(scale)));
-        let rays: Vec<Ray> = (rays(2000, &targets).into_iter())
+        let rays: Vec<Ray> = (rays(1000, &targets).into_iter())
             .map(|ray| Ray {
                 origin: ray.origin * scale as f32,
                 ..ray
@@ -245,7 +245,7 @@ fn degenerate_triangles_and_sizes_of_all_kinds_are_traced_alike_by_all() {
             .collect();
         let shapes = [Arc::new(Geometry::Mesh(TriangleMesh::new(soup)))];
         assert!(
-            agree(&all(&shapes, &[0], &[]), &rays) > 1000,
+            agree(&all(&shapes, &[0], &[]), &rays) > 500,
             "scale {scale}"
         );
     }

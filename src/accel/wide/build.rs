@@ -137,6 +137,10 @@ fn clustered(boxes: &[Bounds], runs: &mut Runs, work: Build) -> Bvh2 {
         if tree.nodes[node].is_leaf() {
             let run = tree.primitive_indices[tree.nodes[node].first_index as usize] as usize;
             let range = ranges[run].clone();
+            if let [item] = runs.items[range.clone()] {
+                tree.nodes[node] = Bvh2Node::new(aabb(&boxes[item as usize]), 1, item);
+                continue;
+            }
             halve(boxes, &mut runs.items[range], node, &mut tree.nodes);
         }
     }
