@@ -15,9 +15,9 @@ HEAD = """\
 <!-- A virus as a scene graph: groups in groups, each under its transform and with its material; the spikes are
      instances of one shapegroup. Written by tools/virus.py{arguments}. -->
 <scene version="3.0.0">
-    <default name="spp" value="256"/>
-    <default name="resx" value="640"/>
-    <default name="resy" value="400"/>
+    <default name="spp" value="64"/>
+    <default name="resx" value="480"/>
+    <default name="resy" value="300"/>
 
     <integrator type="path">
         <integer name="max_depth" value="6"/>

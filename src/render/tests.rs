@@ -483,3 +483,63 @@ fn an_adaptive_crop_has_the_pixels_of_the_whole_and_more_samples_where_it_is_noi
         }
     }
 }
+
+/// A lamp so small that few paths in a thousand meet it: many pilots see nothing of it. Were the number of samples
+/// decided by the samples themselves, bright ones would count for less.
+#[test]
+fn adaptive_sampling_of_rare_light_does_not_bias_the_mean() {
+    let scene = "<scene version='3.0.0'>
+        <integrator type='direct'>
+            <integer name='emitter_samples' value='0'/><integer name='bsdf_samples' value='1'/>
+        </integrator>
+        <sensor type='orthographic'>
+            <transform name='to_world'><scale value='0.3'/><lookat origin='0, 0, 2' target='0, 0, 0' up='0, 1, 0'/></transform>
+            <film type='hdrfilm'><integer name='width' value='24'/><integer name='height' value='24'/></film>
+            <sampler type='independent'/>
+        </sensor>
+        <shape type='rectangle'/>
+        <shape type='sphere'>
+            <point name='center' x='0.8' y='0' z='0.9'/><float name='radius' value='0.1'/>
+            <emitter type='area'><rgb name='radiance' value='100'/></emitter>
+        </shape>
+    </scene>";
+    let place = Place::new();
+    let session = std::cell::RefCell::new(Session::default());
+    let means = |adaptive: Option<Adaptive>, spp: Option<u32>, seeds: std::ops::Range<u64>| {
+        let mut description = place.scene(scene);
+        let overrides = Overrides {
+            spp,
+            ..Overrides::default()
+        };
+        overrides.apply(&mut description);
+        let runs = seeds.map(|seed| {
+            let options = Options {
+                seed,
+                adaptive,
+                ..Options::default()
+            };
+            let mut session = session.borrow_mut();
+            let rendered = session.render(&description, &options, &Silent).unwrap();
+            let image = rendered.image;
+            let sum: f64 = (image.data().chunks_exact(image.channels().len()))
+                .map(|p| f64::from(p[1]))
+                .sum();
+            sum / (24.0 * 24.0)
+        });
+        let runs: Vec<f64> = runs.collect();
+        let n = runs.len() as f64;
+        let mean = runs.iter().sum::<f64>() / n;
+        let variance = runs.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / (n - 1.0);
+        (mean, variance / n)
+    };
+    let adaptive = Adaptive {
+        noise_threshold: 1.0,
+        min_spp: 16,
+        max_spp: 256,
+    };
+    let (a, va) = means(Some(adaptive), None, 0..48);
+    let (b, vb) = means(None, Some(256), 100..116);
+    let error = (va + vb).sqrt();
+    assert!(error < 0.04 * b, "{error} is too much to tell: {a}, {b}");
+    assert!((a - b).abs() < 4.0 * error, "{a} and {b}, ± {error}");
+}
