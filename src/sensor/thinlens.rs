@@ -272,7 +272,7 @@ mod tests {
         let radius = r#"<float name="aperture_radius" value="0.1"/>"#;
         for (inside, message) in [
             ("", "needs an aperture_radius"),
-            (r#"<float name="aperture_radius" value="-1"/>"#, "negative"),
+            (r#"<float name="aperture_radius" value="-1"/>"#, "from 0 to"),
             (
                 &format!(r#"{radius}<float name="focus_distance" value="0"/>"#),
                 "must be positive",
