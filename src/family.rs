@@ -28,6 +28,7 @@ macro_rules! family {
                 properties: &crate::description::Properties<'_>,
                 context: &$context,
             ) -> crate::error::Result<Self> {
+                crate::family::check_strict(properties, $kind, Self::NAMES)?;
                 match properties.plugin() {
                     $($name => Ok(Self::$member(<$type>::build(properties, context)?)),)+
                     other => Err(crate::family::unknown(properties, $kind, other, Self::NAMES)),
@@ -49,10 +50,12 @@ macro_rules! family {
 
 pub(crate) use family;
 
+use crate::description::properties::STRICT;
 use crate::description::{Kind, Properties};
-use crate::error::Error;
+use crate::error::{Error, Result};
 
-/// Plugins of Mitsuba 3.9 by kind: a name found here is not misspelt, Étendue lacks it.
+/// Plugins of Mitsuba 3.9 by kind: a name that only this list has is not misspelt, Étendue lacks it; one that
+/// only a family has is Étendue's own.
 const MITSUBA: &[(Kind, &[&str])] = &[
     (
         Kind::Shape,
@@ -191,6 +194,28 @@ const MITSUBA: &[(Kind, &[&str])] = &[
     ),
 ];
 
+/// Whether Mitsuba has a plugin of that name; its textures and spectra are one family.
+fn is_mitsubas(kind: Kind, name: &str) -> bool {
+    let alike = |k: Kind| match k {
+        Kind::Spectrum => Kind::Texture,
+        other => other,
+    };
+    MITSUBA
+        .iter()
+        .any(|(k, plugins)| alike(*k) == alike(kind) && plugins.contains(&name))
+}
+
+/// Refuses a plugin that is Étendue's own, one of `names` but none of Mitsuba's, where the scene is read
+/// strictly.
+pub(crate) fn check_strict(properties: &Properties<'_>, kind: &str, names: &[&str]) -> Result<()> {
+    let name = properties.plugin();
+    if !properties.is_strict() || !names.contains(&name) || is_mitsubas(properties.kind(), name) {
+        return Ok(());
+    }
+    let error = Error::input(format!("{kind} {name:?} is Étendue's own"));
+    Err(error.at(properties.location()).help(STRICT))
+}
+
 /// The error for a plugin that its family does not have.
 pub(crate) fn unknown(
     properties: &Properties<'_>,
@@ -198,10 +223,7 @@ pub(crate) fn unknown(
     name: &str,
     names: &[&str],
 ) -> Error {
-    let known_to_mitsuba = MITSUBA
-        .iter()
-        .any(|(k, plugins)| *k == properties.kind() && plugins.contains(&name));
-    let error = if known_to_mitsuba {
+    let error = if is_mitsubas(properties.kind(), name) {
         Error::unsupported(format!(
             "{kind} \"{name}\" exists in Mitsuba but not in Étendue"
         ))

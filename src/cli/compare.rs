@@ -44,7 +44,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "METRIC=VALUE", value_parser = limit, conflicts_with = "a", help_heading = PAIR)]
     fail_below: Vec<Limit>,
     /// The greatest value meant to occur: PSNR's peak, SSIM's range
-    #[arg(long, value_name = "VALUE", default_value_t = 1.0, value_parser = positive, help_heading = PAIR)]
+    #[arg(long, value_name = "VALUE", default_value_t = 1.0, value_parser = parse::positive, help_heading = PAIR)]
     peak: f64,
     /// Pixels in a degree of the visual field, for FLIP
     #[arg(long, value_name = "N", default_value_t = flip::PIXELS_PER_DEGREE,
@@ -61,7 +61,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "P", default_value_t = 0.99, value_parser = probability, help_heading = SEEDS)]
     confidence: f64,
     /// Refuse to compare (status 2) where a relative difference of the mean below this could hide in noise
-    #[arg(long, value_name = "PART", value_parser = positive, requires = "a", help_heading = SEEDS)]
+    #[arg(long, value_name = "PART", value_parser = parse::positive, requires = "a", help_heading = SEEDS)]
     precision: Option<f64>,
 
     /// The reference's mean
@@ -162,17 +162,13 @@ fn limit(text: &str) -> std::result::Result<Limit, String> {
     Ok(Limit { metric, value })
 }
 
-fn positive(text: &str) -> std::result::Result<f64, String> {
-    let value: f64 = text.parse().map_err(|_| "write a number")?;
-    if value > 0.0 && value.is_finite() {
-        Ok(value)
-    } else {
-        Err("it must be positive".to_owned())
-    }
-}
-
 fn pixels_per_degree(text: &str) -> std::result::Result<f32, String> {
-    Ok(positive(text)? as f32)
+    let number = parse::positive(text)? as f32;
+    if number > 0.0 && number.is_finite() {
+        Ok(number)
+    } else {
+        Err(format!("{text} is out of all bounds"))
+    }
 }
 
 fn probability(text: &str) -> std::result::Result<f64, String> {

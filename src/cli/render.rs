@@ -75,9 +75,9 @@ pub(super) struct Arguments {
     /// error of a pixel's luminance L divided by the square root of L. EXR gets the channels "samples" and "error"
     #[arg(long, value_name = "T", value_parser = parse::positive, conflicts_with = "spp", help_heading = ADAPTIVE)]
     noise_threshold: Option<f64>,
-    /// The fewest samples a pixel; more where the sampler's sets are larger
-    #[arg(long, default_value_t = 32, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 24), requires = "noise_threshold", help_heading = ADAPTIVE)]
-    min_spp: u32,
+    /// The fewest samples a pixel, by default 32 or --max-spp; more where the sampler's sets are larger
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 24), requires = "noise_threshold", help_heading = ADAPTIVE)]
+    min_spp: Option<u32>,
     /// The most samples a pixel; more where the sampler's sets are larger
     #[arg(long, default_value_t = 1024, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 24), requires = "noise_threshold", help_heading = ADAPTIVE)]
     max_spp: u32,
@@ -180,7 +180,7 @@ impl Arguments {
             colors: self.bands.map_or(Colors::Rgb, |n| Colors::Bands(n.into())),
             adaptive: self.noise_threshold.map(|noise_threshold| Adaptive {
                 noise_threshold,
-                min_spp: self.min_spp.min(self.max_spp),
+                min_spp: self.min_spp.unwrap_or(32).min(self.max_spp),
                 max_spp: self.max_spp,
             }),
             method: match self.accel {
@@ -235,6 +235,13 @@ impl Arguments {
 
 /// Runs the command; the answer is the exit status.
 pub(super) fn run(arguments: &Arguments) -> Result<u8> {
+    if let Some(least) = arguments.min_spp.filter(|least| *least > arguments.max_spp) {
+        let message = format!(
+            "--min-spp {least} is more than --max-spp {}",
+            arguments.max_spp
+        );
+        return Err(Error::input(message));
+    }
     let stop = Stop::on_signals()?;
     let Batch { items, failed } = arguments.batch()?;
     output::check_distinct(items.iter().map(|i| (i.output.as_path(), i.name())))?;

@@ -217,7 +217,8 @@ pub struct Options {
     pub defines: Vec<(String, String)>,
     /// Values for parameters that the file may have or not, such as the number of a frame; `defines` come first.
     pub offers: Vec<(String, String)>,
-    /// Whether what Mitsuba 3 does not read (keyframes, `#rrggbb`, `<lookAt>`) is an error.
+    /// Whether what Mitsuba 3 does not read (keyframes, `#rrggbb`, `<lookAt>`, Étendue's own plugins and
+    /// properties) is an error: at once, or of plugins and properties when they are built.
     pub strict: bool,
 }
 
@@ -227,6 +228,8 @@ pub struct Description {
     nodes: Vec<Node>,
     scopes: Scopes,
     warnings: Vec<Problem>,
+    /// As [`Options::strict`].
+    strict: bool,
 }
 
 impl Description {

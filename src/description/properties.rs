@@ -10,6 +10,9 @@ use glam::{DMat4, DVec3};
 use super::{Description, Kind, Node, NodeId, Property, Value};
 use crate::error::{Error, Location, Result};
 
+/// Why what is Étendue's own is refused.
+pub(crate) const STRICT: &str = "Mitsuba 3 would not read it, which --strict refuses";
+
 /// A view of one node, which records what was read. Every typed question answers `Ok(None)` where the property is
 /// absent and an error at the property where it is of another type.
 #[derive(Clone, Copy, Debug)]
@@ -206,6 +209,32 @@ impl<'a> Properties<'a> {
         &self.node.properties
     }
 
+    /// Whether what Mitsuba 3 does not read is an error.
+    pub fn is_strict(&self) -> bool {
+        self.description.strict
+    }
+
+    /// Says of properties, before they are asked for, that they are Étendue's own.
+    ///
+    /// # Errors
+    /// At the first that is there, where the scene is read strictly.
+    pub fn own(&self, names: &[&str]) -> Result<()> {
+        let present = |name: &&&str| self.is_strict() && self.has(name);
+        match names.iter().find(present) {
+            None => Ok(()),
+            Some(name) => Err(self
+                .error(
+                    name,
+                    format!(
+                        "property {name:?} of {} {:?} is Étendue's own",
+                        self.kind(),
+                        self.plugin()
+                    ),
+                )
+                .help(STRICT)),
+        }
+    }
+
     /// Counts the property as read without using it.
     pub fn ignore(&self, name: &'static str) {
         self.value(name);
@@ -222,9 +251,9 @@ impl<'a> Properties<'a> {
     }
 
     fn at(&self, name: &str, error: Error) -> Error {
-        error.at(self
-            .find(name)
-            .map_or(&self.node.location, |property| &property.location))
+        // Nested plugins have no name, unless the file gives them one.
+        let named = self.find(name).filter(|_| !name.is_empty());
+        error.at(named.map_or(&self.node.location, |property| &property.location))
     }
 
     fn find(&self, name: &str) -> Option<&'a Property> {
@@ -291,6 +320,13 @@ mod tests {
             "test.xml:3:3: property \"radius\": expected a float, found a string"
         );
         assert!(sphere.float("height").unwrap().is_none());
+    }
+
+    #[test]
+    fn an_error_without_a_name_points_at_the_node_and_not_at_what_is_nested() {
+        let scene = scene("\n<shape type='sphere'>\n  <bsdf type='diffuse'/></shape>");
+        let error = scene.root().children(Kind::Shape)[0].error("", "wrong");
+        assert_eq!(error.to_string(), "test.xml:2:1: wrong");
     }
 
     #[test]

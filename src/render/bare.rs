@@ -78,7 +78,12 @@ pub fn describe_mesh(path: &Path, up: UpAxis, options: &Options) -> Result<Descr
         camera: camera.and_then(|camera| own_camera(&camera)),
         mesh: &loaded.mesh,
     });
-    Description::parse(&text, path, options)
+    // What is written here is nobody's to be refused.
+    let options = Options {
+        strict: false,
+        ..options.clone()
+    };
+    Description::parse(&text, path, &options)
 }
 
 /// What the scene shows.

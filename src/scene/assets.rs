@@ -195,6 +195,7 @@ impl<'a> Plan<'a> {
 
     /// Notes the shapes of a node of the scene graph. Nodes are not nested without end.
     fn node(&mut self, properties: &Properties<'a>, space: &Space<'a>) -> Result<()> {
+        shape::check_strict(properties)?;
         let own = properties.transform("to_world")?;
         let bsdf = properties.child(Kind::Bsdf)?;
         let inner = Space {

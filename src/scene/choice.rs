@@ -1,5 +1,5 @@
-//! Which light a path looks toward: each in proportion to the power that it gives to the scene, but for a part
-//! that is the same for all, since a weak light may be a near one. An environment, whose power grows with the
+//! Which light a path looks toward: half of the choices are in proportion to the power that lights give to the
+//! scene, half are even, since a weak light may be a near one. An environment, whose power grows with the
 //! scene's size, counts for no more than all other lights together: samples of the material find it as well.
 //! Lights without power are never chosen.
 
@@ -17,7 +17,7 @@ pub(super) struct Choice {
     probabilities: Vec<f32>,
 }
 
-/// The part of the choices that does not look at power.
+/// The share of the choices that does not look at power.
 const EVEN: f64 = 0.5;
 
 impl Choice {

@@ -44,12 +44,16 @@ impl Aperture {
                 .error("", "a thinlens needs an aperture_radius")
                 .help("a perspective sensor sees everything sharp"));
         };
-        if radius < 0.0 {
+        if !(0.0..=f64::from(f32::MAX)).contains(&radius) {
             return Err(properties.error(
                 "aperture_radius",
-                format!("a radius cannot be negative, and {radius} is"),
+                format!(
+                    "a radius is a number from 0 to {:e}, and {radius} is not",
+                    f32::MAX
+                ),
             ));
         }
+        properties.own(&["aperture_blades", "aperture_rotation"])?;
         let blades = properties.integer("aperture_blades")?.unwrap_or(0);
         if blades != 0 && !(3..=MAX_BLADES).contains(&blades) {
             return Err(properties
@@ -92,7 +96,7 @@ impl ThinLens {
     pub(super) fn build(properties: &Properties<'_>, film: &Film) -> Result<Self> {
         let pinhole = Perspective::build(properties, film)?;
         let focus_distance = match properties.float("focus_distance")? {
-            Some(distance) if distance <= 0.0 => {
+            Some(distance) if !(distance as f32 > 0.0 && (distance as f32).is_finite()) => {
                 return Err(properties.error(
                     "focus_distance",
                     format!("focus_distance must be positive, and {distance} is not"),
@@ -268,7 +272,7 @@ mod tests {
         let radius = r#"<float name="aperture_radius" value="0.1"/>"#;
         for (inside, message) in [
             ("", "needs an aperture_radius"),
-            (r#"<float name="aperture_radius" value="-1"/>"#, "negative"),
+            (r#"<float name="aperture_radius" value="-1"/>"#, "from 0 to"),
             (
                 &format!(r#"{radius}<float name="focus_distance" value="0"/>"#),
                 "must be positive",

@@ -11,6 +11,7 @@ use crate::description::Properties;
 use crate::error::Result;
 
 pub(super) fn build(properties: &Properties<'_>, outer: &DMat4) -> Result<Shape> {
+    properties.own(&["caps"])?;
     let caps = properties.boolean("caps")?.unwrap_or(false);
     let closed = if caps { vec![0.0, 1.0] } else { Vec::new() };
     let slope = 0.0;

@@ -253,6 +253,11 @@ pub fn names() -> Vec<&'static str> {
     single.chain([GROUP, INSTANCE, NODE]).collect()
 }
 
+/// Refuses a shape plugin that is Étendue's own where the scene is read strictly.
+pub(crate) fn check_strict(properties: &Properties<'_>) -> Result<()> {
+    family::check_strict(properties, "shape", &names())
+}
+
 /// Builds the shape that `properties` names.
 pub fn build(properties: &Properties<'_>) -> Result<Shape> {
     build_within(&DMat4::IDENTITY, properties)
@@ -261,6 +266,7 @@ pub fn build(properties: &Properties<'_>) -> Result<Shape> {
 /// Builds the shape that `properties` names, in a space from which `outer` leads to the world's.
 pub fn build_within(outer: &DMat4, properties: &Properties<'_>) -> Result<Shape> {
     debug_assert_eq!(properties.kind(), Kind::Shape);
+    check_strict(properties)?;
     match PLUGINS
         .iter()
         .find(|(name, _)| *name == properties.plugin())

@@ -114,8 +114,11 @@ fn plane(corners: &[DVec3]) -> Result<DVec3> {
         .iter()
         .map(|p| from_first(*p).length())
         .fold(0.0, f64::max);
-    if doubled.length() <= 1e-12 * size * size {
-        return Err(Error::input("the polygon encloses no area"));
+    let area = doubled.length();
+    if !(area > 1e-12 * size * size && area.is_finite()) {
+        return Err(Error::input(
+            "the polygon encloses no area, or none that is finite",
+        ));
     }
     let normal = doubled.normalize();
     let off = |p: &DVec3| from_first(*p).dot(normal).abs();

@@ -23,14 +23,22 @@ pub struct ZonePlate<C: ColorModel> {
     to_uv: Mat3,
 }
 
+/// The most rings: the phase of more is lost in rounding.
+const MAX_RINGS: f64 = 1e6;
+
 impl<C: ColorModel> ZonePlate<C> {
     pub(super) fn build(properties: &Properties<'_>, palette: &Palette<C>) -> Result<Self> {
+        let rings = properties.float("rings")?.unwrap_or(32.0);
+        if !(0.0..=MAX_RINGS).contains(&rings) {
+            let message = format!("rings are a number from 0 to {MAX_RINGS}, and {rings} is not");
+            return Err(properties.error("rings", message));
+        }
         Ok(Self {
             colors: Box::new([
                 palette.texture(properties, "color0", palette.role, Color::Grey(0.0))?,
                 palette.texture(properties, "color1", palette.role, Color::Grey(1.0))?,
             ]),
-            rings: properties.float("rings")?.unwrap_or(32.0) as f32,
+            rings: rings as f32,
             to_uv: to_uv(properties)?,
         })
     }

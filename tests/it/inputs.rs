@@ -9,19 +9,19 @@ use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
 /// A scene that is wrong. `<!--!-->` marks the line that the message must name.
-struct Case {
+struct Case<'a> {
     name: &'static str,
     /// Arguments after `render scene.xml -o image.exr`, separated by spaces.
     arguments: &'static str,
     /// What stands between `<scene version="3.0.0">`, the sensor and the end.
-    body: &'static str,
+    body: &'a str,
     status: i32,
     /// What standard error must contain.
     says: &'static [&'static str],
 }
 
 /// A scene's error, for which the input is to blame.
-const fn wrong(name: &'static str, body: &'static str, says: &'static [&'static str]) -> Case {
+const fn wrong<'a>(name: &'static str, body: &'a str, says: &'static [&'static str]) -> Case<'a> {
     Case {
         name,
         arguments: "",
@@ -37,7 +37,7 @@ const fn usage(
     arguments: &'static str,
     status: i32,
     says: &'static [&'static str],
-) -> Case {
+) -> Case<'static> {
     Case {
         name,
         arguments,
@@ -47,7 +47,7 @@ const fn usage(
     }
 }
 
-const CASES: &[Case] = &[
+const CASES: &[Case<'static>] = &[
     wrong(
         "a second integrator",
         r#"<integrator type="path"/>
@@ -263,6 +263,108 @@ const CASES: &[Case] = &[
         r#"<sensor type="perspective"><sampler type="independent"><integer name="sample_count" value="9000000000000"/><!--!--></sampler></sensor>"#,
         &["sample_count"],
     ),
+    // ---- shapes of Étendue's own
+    wrong(
+        "a light without area",
+        r#"<shape type="plane"><emitter type="area"/></shape><!--!-->"#,
+        &[],
+    ),
+    wrong(
+        "a cone without width",
+        r#"<shape type="cone"><float name="radius" value="0"/><!--!--></shape>"#,
+        &["a cone needs a positive radius"],
+    ),
+    wrong(
+        "a cone without height",
+        r#"<shape type="cone"><point name="p1" value="0, 0, 0"/><!--!--></shape>"#,
+        &["the ends of a cone cannot be the same"],
+    ),
+    wrong(
+        "a triangle of two corners",
+        r#"<shape type="triangle"><point name="p0" value="0, 0, 0"/><point name="p1" value="1, 0, 0"/></shape><!--!-->"#,
+        &["a triangle needs a point \"p2\""],
+    ),
+    wrong(
+        "a triangle on a line",
+        r#"<shape type="triangle"><point name="p0" value="0, 0, 0"/><point name="p1" value="1, 0, 0"/><point name="p2" value="2, 0, 0"/></shape><!--!-->"#,
+        &["cannot lie on a line"],
+    ),
+    wrong(
+        "a triangle with one normal",
+        r#"<shape type="triangle"><point name="p0" value="0, 0, 0"/><point name="p1" value="1, 0, 0"/><point name="p2" value="0, 1, 0"/><vector name="n1" value="0, 0, 1"/></shape><!--!-->"#,
+        &["give n0, n1 and n2"],
+    ),
+    wrong(
+        "a polygon of two corners",
+        r#"<shape type="polygon"><point name="p0" value="0, 0, 0"/><point name="p1" value="1, 0, 0"/></shape><!--!-->"#,
+        &["three corners at least"],
+    ),
+    wrong(
+        "a polygon that lacks a corner",
+        r#"<shape type="polygon"><point name="p0" value="0, 0, 0"/><point name="p1" value="1, 0, 0"/><point name="p9999999999" value="0, 1, 0"/></shape><!--!-->"#,
+        &["has no corner p2"],
+    ),
+    wrong(
+        "a polygon that crosses itself",
+        r#"<shape type="polygon"><point name="p0" value="0, 0, 0"/><point name="p1" value="2, 1, 0"/><point name="p2" value="2, 0, 0"/><point name="p3" value="0, 2, 0"/></shape><!--!-->"#,
+        &["crosses itself", "from p0 to p1"],
+    ),
+    wrong(
+        "a polygon that is not flat",
+        r#"<shape type="polygon"><point name="p0" value="0, 0, 0"/><point name="p1" value="1, 0, 0"/><point name="p2" value="1, 1, 1"/><point name="p3" value="0, 1, 0"/></shape><!--!-->"#,
+        &["not flat"],
+    ),
+    wrong(
+        "a polygon larger than numbers",
+        r#"<shape type="polygon"><point name="p0" value="0, 0, 0"/><point name="p1" value="1e150, 0, 0"/><point name="p2" value="0, 1e150, 0"/></shape><!--!-->"#,
+        &["none that is finite"],
+    ),
+    wrong(
+        "a polygon with too few texture coordinates",
+        r#"<shape type="polygon"><point name="p0" value="0, 0, 0"/><point name="p1" value="1, 0, 0"/><point name="p2" value="0, 1, 0"/><string name="uv" value="0 0 1 0 nan 1"/><!--!--></shape>"#,
+        &["uv is 3 pairs of numbers here"],
+    ),
+    wrong(
+        "a group in itself",
+        r#"<shape type="group" id="a"><ref id="a"/></shape>"#,
+        &["itself"],
+    ),
+    // ---- lenses, samplers, textures
+    wrong(
+        "a lens without a radius",
+        r#"<sensor type="thinlens"/><!--!-->"#,
+        &["needs an aperture_radius"],
+    ),
+    wrong(
+        "a lens wider than numbers",
+        r#"<sensor type="thinlens"><float name="aperture_radius" value="1e300"/><!--!--></sensor>"#,
+        &["a radius is a number from 0"],
+    ),
+    wrong(
+        "a lens in focus at nothing",
+        r#"<sensor type="thinlens"><float name="aperture_radius" value="1"/><float name="focus_distance" value="1e-300"/><!--!--></sensor>"#,
+        &["focus_distance must be positive"],
+    ),
+    wrong(
+        "a lens of two blades",
+        r#"<sensor type="thinlens"><float name="aperture_radius" value="1"/><integer name="aperture_blades" value="2"/><!--!--></sensor>"#,
+        &["2 blades; 3 to 64"],
+    ),
+    wrong(
+        "discs without a number",
+        r#"<sensor type="perspective"><sampler type="poisson"><integer name="sample_count" value="-4"/><!--!--></sampler></sensor>"#,
+        &["sample_count"],
+    ),
+    wrong(
+        "arrays of another strength",
+        r#"<sensor type="perspective"><sampler type="orthogonal"><integer name="strength" value="3"/></sampler></sensor><!--!-->"#,
+        &["strength 3", "they have strength 2"],
+    ),
+    wrong(
+        "rings without number",
+        r#"<shape type="sphere"><bsdf type="diffuse"><texture type="zoneplate" name="reflectance"><float name="rings" value="1e30"/><!--!--></texture></bsdf></shape>"#,
+        &["rings are a number from 0 to 1000000"],
+    ),
     // ---- files
     wrong(
         "a mesh that is not there",
@@ -342,6 +444,42 @@ const CASES: &[Case] = &[
     usage("no samples at all", "--spp 0", 2, &["--spp"]),
     usage("a size of one", "--size 64", 2, &["640x480"]),
     usage("a crop of three", "--crop 1,2,3", 2, &["X,Y,WIDTH,HEIGHT"]),
+    usage(
+        "noise of nothing",
+        "--noise-threshold 0",
+        2,
+        &["0 is not positive"],
+    ),
+    usage(
+        "noise that is no number",
+        "--noise-threshold nan",
+        2,
+        &["nan is not positive"],
+    ),
+    usage(
+        "two numbers of samples",
+        "--noise-threshold 0.1 --spp 4",
+        2,
+        &["--spp"],
+    ),
+    usage(
+        "the most samples of nothing",
+        "--max-spp 4",
+        2,
+        &["--noise-threshold"],
+    ),
+    usage(
+        "more samples at least than at most",
+        "--noise-threshold 0.1 --min-spp 9 --max-spp 8",
+        1,
+        &["--min-spp 9 is more than --max-spp 8"],
+    ),
+    usage(
+        "noise that points do not show",
+        "--noise-threshold 0.1 --sampler grid",
+        1,
+        &["the same in every set"],
+    ),
     usage("33 bands", "--bands 33", 2, &["33"]),
     usage("a definition without a value", "-D spp", 2, &["name=value"]),
     usage("threads without number", "--threads 0", 2, &["--threads"]),
@@ -406,7 +544,7 @@ const CASES: &[Case] = &[
 /// A sensor for the bodies that have none.
 const SENSOR: &str = r#"<sensor type="perspective"><film type="hdrfilm"><integer name="width" value="4"/><integer name="height" value="4"/></film></sensor>"#;
 
-fn scene_of(case: &Case) -> String {
+fn scene_of(case: &Case<'_>) -> String {
     let sensor = if case.body.contains("<sensor") {
         ""
     } else {
@@ -444,7 +582,7 @@ fn run(folder: &Path, arguments: &[&str]) -> Option<Output> {
 }
 
 /// What is wrong with how the program takes a case.
-fn complaints(folder: &TempDir, case: &Case) -> Vec<String> {
+fn complaints(folder: &TempDir, case: &Case<'_>) -> Vec<String> {
     let text = scene_of(case);
     fs::write(folder.path().join("scene.xml"), &text).expect("the folder is there");
     let mut arguments = vec!["render", "scene.xml", "--quiet"];
@@ -540,4 +678,151 @@ fn what_is_right_is_rendered_with_status_zero() {
         assert_eq!(said["size"], serde_json::json!([4, 4]));
         assert!(folder.path().join(name).exists());
     }
+}
+
+/// Bodies with one thing each that only Étendue reads.
+const OWN: &[&str] = &[
+    r#"<sensor type="perspective"><sampler type="grid"/><!--!--></sensor>"#,
+    r#"<sensor type="perspective"><sampler type="poisson"/><!--!--></sensor>"#,
+    r#"<sensor type="perspective"><sampler type="sobol"/><!--!--></sensor>"#,
+    r#"<sensor type="thinlens"><float name="aperture_radius" value="1"/><integer name="aperture_blades" value="5"/><!--!--></sensor>"#,
+    r#"<sensor type="thinlens"><float name="aperture_radius" value="1"/><float name="aperture_rotation" value="5"/><!--!--></sensor>"#,
+    r#"<integrator type="phong"/><!--!-->"#,
+    r#"<integrator type="moment"><integrator type="phong" name="a"/></integrator><!--!-->"#,
+    r#"<emitter type="ambient"/><!--!-->"#,
+    r#"<shape type="sphere"><bsdf type="phong"/></shape><!--!-->"#,
+    r#"<shape type="sphere"><bsdf type="diffuse"><texture type="zoneplate" name="reflectance"/></bsdf></shape><!--!-->"#,
+    r#"<shape type="plane"/><!--!-->"#,
+    r#"<shape type="cone"/><!--!-->"#,
+    r#"<shape type="triangle"><point name="p0" value="0, 0, 0"/><point name="p1" value="1, 0, 0"/><point name="p2" value="0, 1, 0"/></shape><!--!-->"#,
+    r#"<shape type="polygon"><point name="p0" value="0, 0, 0"/><point name="p1" value="1, 0, 0"/><point name="p2" value="0, 1, 0"/></shape><!--!-->"#,
+    r#"<shape type="group"><shape type="sphere"/></shape><!--!-->"#,
+    r#"<shape type="cylinder"><boolean name="caps" value="true"/></shape><!--!-->"#,
+];
+
+#[test]
+fn what_only_etendue_reads_is_refused_strictly_and_nothing_else_is() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let mut failures = Vec::new();
+    for body in OWN {
+        let strictly = Case {
+            arguments: "--strict --spp 1",
+            says: &["is Étendue's own", "--strict"],
+            ..wrong("", body, &[])
+        };
+        // The mark is for what is wrong.
+        let body = &body.replace("<!--!-->", "");
+        let freely = usage("", "--spp 1 -o free.png", 0, &[]);
+        let freely = Case { body, ..freely };
+        for case in [strictly, freely] {
+            let complaints = complaints(&folder, &case);
+            if !complaints.is_empty() {
+                failures.push(format!("{body}: {}", complaints.join("; ")));
+            }
+        }
+    }
+    let theirs = Case {
+        arguments: "--strict --spp 1 -o free.png",
+        ..usage("", "", 0, &[])
+    };
+    let body = r#"<sensor type="thinlens"><float name="aperture_radius" value="1"/><sampler type="multijitter"/></sensor>
+        <integrator type="direct"/><emitter type="constant"/><shape type="cylinder"><bsdf type="diffuse">
+        <texture type="uniform" name="reflectance"/></bsdf></shape>"#;
+    failures.extend(complaints(&folder, &Case { body, ..theirs }));
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
+}
+
+/// Command lines that are wrong, beside `a.exr` (4 × 4), `dot.exr` (1 × 1) and `empty.exr` (0 bytes).
+const COMMANDS: &[(&str, i32, &str)] = &[
+    ("compare dot.exr dot.exr", 0, "equal"),
+    ("compare a.exr", 2, "nothing to hold it against"),
+    ("compare a.exr nowhere.exr", 2, "nowhere.exr"),
+    ("compare a.exr empty.exr", 2, "empty"),
+    ("compare a.exr scene.xml", 2, "scene.xml"),
+    ("compare a.exr dot.exr", 2, "the sizes differ"),
+    (
+        "compare a.exr a.exr --crop 0,0,0,0",
+        2,
+        "is empty or reaches beyond",
+    ),
+    (
+        "compare a.exr a.exr --crop 4294967295,0,4294967295,1",
+        2,
+        "reaches beyond",
+    ),
+    ("compare a.exr a.exr --layer velvet", 2, "velvet"),
+    ("compare a.exr a.exr --peak nan", 2, "not positive"),
+    ("compare a.exr a.exr --ppd 1e300", 2, "out of all bounds"),
+    (
+        "compare a.exr a.exr --fail-above psnr=3",
+        2,
+        "more psnr is better",
+    ),
+    (
+        "compare a.exr a.exr --fail-above rmsq=3",
+        2,
+        "there is no metric",
+    ),
+    ("compare a.exr a.exr --fail-above rmse=nan", 2, "NaN"),
+    ("compare --a a.exr --b a.exr", 2, "two"),
+    (
+        "compare a.exr --reference a.exr --variance a.exr --spp 0",
+        2,
+        "--spp",
+    ),
+    ("relight a.exr", 1, "has no layers"),
+    (
+        "relight a.exr -o b.exr -w diffuse=nan",
+        2,
+        "finite and not negative",
+    ),
+    ("relight a.exr -o b.exr -w diffuse=1", 1, "has no layers"),
+    ("relight a.exr -w diffuse=1", 2, "--output"),
+    ("relight empty.exr", 1, "empty"),
+    ("crosscheck scene.xml --seeds 1", 2, "--seeds"),
+    ("crosscheck scene.xml --seed 2147483648", 2, "--seed"),
+    ("crosscheck scene.xml --precision 0", 2, "0 is not positive"),
+    ("crosscheck scene.xml --timeout inf", 2, "not between"),
+];
+
+#[test]
+fn every_wrong_command_line_is_named_and_survived() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let scene = scene_of(&usage("", "", 0, &[]));
+    fs::write(folder.path().join("scene.xml"), scene).expect("the folder is there");
+    fs::write(folder.path().join("empty.exr"), "").expect("the folder is there");
+    for (name, size) in [("a.exr", "4x4"), ("dot.exr", "1x1")] {
+        let arguments = [
+            "render",
+            "scene.xml",
+            "--spp",
+            "1",
+            "--size",
+            size,
+            "-o",
+            name,
+        ];
+        let output = run(folder.path(), &arguments).expect("it ends");
+        assert_eq!(output.status.code(), Some(0), "{output:?}");
+    }
+    let mut failures = Vec::new();
+    for (line, status, says) in COMMANDS {
+        let arguments: Vec<&str> = line.split_whitespace().collect();
+        let Some(output) = run(folder.path(), &arguments) else {
+            failures.push(format!("{line}: does not end"));
+            continue;
+        };
+        let said = [output.stdout, output.stderr].concat();
+        let said = String::from_utf8_lossy(&said);
+        if output.status.code() != Some(*status)
+            || !said.contains(says)
+            || said.contains("panicked")
+        {
+            failures.push(format!(
+                "{line}: {:?}, it said:\n{said}",
+                output.status.code()
+            ));
+        }
+    }
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
 }

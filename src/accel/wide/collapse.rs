@@ -7,7 +7,7 @@ use obvhs::bvh2::node::Bvh2Node;
 use rayon::prelude::*;
 
 use super::build::Binary;
-use super::node::{BLOCK, Block, LEAF, Node, OTHER, OTHER_INDEX, WIDTH};
+use super::node::{BLOCK, BLOCK_INDEX, Block, LEAF, Node, OTHER, OTHER_INDEX, WIDTH};
 use super::{Leaves, Tree};
 use crate::shape::Bounds;
 
@@ -40,8 +40,10 @@ fn share(first: &Plan, second: &Plan, slots: usize) -> (usize, f32) {
     best
 }
 
+/// Half the area of a node's box: infinite where a product of its sides overflows, be others zero.
 fn area(node: &Bvh2Node) -> f32 {
-    node.aabb().half_area()
+    let area = node.aabb().half_area();
+    if area.is_nan() { f32::INFINITY } else { area }
 }
 
 struct Collapse<'b, L> {
@@ -264,6 +266,10 @@ impl Part {
         assert!(
             self.nodes.len() < LEAF as usize,
             "a tree of fewer than 2³¹ nodes"
+        );
+        assert!(
+            self.blocks.len() < BLOCK_INDEX as usize,
+            "a tree of fewer than 2²⁸ blocks"
         );
         assert!(
             self.others.len() < OTHER_INDEX as usize,

@@ -118,3 +118,30 @@ fn every_kernel_takes_the_steps_that_plain_arithmetic_takes() {
         "some ray enters all children"
     );
 }
+
+/// Items without triangles: only their boxes count.
+struct Others;
+
+impl Leaves for Others {
+    fn is_triangle(&self, _: u32) -> bool {
+        false
+    }
+
+    fn triangle(&self, _: u32) -> (u32, [Vec3; 3]) {
+        unreachable!("there is none")
+    }
+}
+
+#[test]
+fn boxes_whose_area_is_no_number_have_a_tree_too() {
+    let flat = |i: u32| Bounds {
+        min: Vec3::new(-3e38, -3e38, i as f32),
+        max: Vec3::new(3e38, 3e38, i as f32),
+    };
+    for count in [1, 2, 3, 9, 100] {
+        let boxes: Vec<Bounds> = (0..count).map(flat).collect();
+        let (_, mut items) = Tree::build(&boxes, &Others, Build::Medium);
+        items.sort_unstable();
+        assert!(items.into_iter().eq(0..count), "{count}");
+    }
+}

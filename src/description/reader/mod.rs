@@ -101,6 +101,7 @@ impl<'o> Reader<'o> {
             nodes: self.nodes,
             scopes: self.scopes,
             warnings: self.warnings,
+            strict: self.options.strict,
         })
     }
 
