@@ -48,7 +48,7 @@ def main():
             sys.exit(done.stderr)
         if done.returncode:
             flagged += 1
-            print(done.stdout.splitlines()[-1])
+            print(f'pair {pair + 1}: {done.stdout.splitlines()[-1]}', flush=True)
     print(f'{flagged} of {a.pairs} pairs flagged')
     # Mitsuba has been seen to hang on the interpreter's way out.
     sys.stdout.flush()

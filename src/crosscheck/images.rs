@@ -79,7 +79,7 @@ impl Images {
         let map = Map {
             width: self.size()[0] as usize,
             values: &values,
-            label: "|difference| in standard errors",
+            label: "standard errors apart",
             top: robust_top(&values),
         };
         image::write_codes(&folder.join("error.png"), &map.draw()?)?;

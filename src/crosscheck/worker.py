@@ -13,6 +13,11 @@ from pathlib import Path
 
 TAGS = {'ReconstructionFilter': 'rfilter', 'PhaseFunction': 'phase'}
 
+REGISTRIES = {'register_bsdf': 'BSDF', 'register_emitter': 'Emitter', 'register_film': 'Film',
+              'register_integrator': 'Integrator', 'register_medium': 'Medium', 'register_phase': 'PhaseFunction',
+              'register_rfilter': 'ReconstructionFilter', 'register_sampler': 'Sampler', 'register_sensor': 'Sensor',
+              'register_shape': 'Shape', 'register_texture': 'Texture'}
+
 
 class Refused(Exception):
     """The scene asks for what Mitsuba does not have."""
@@ -28,21 +33,33 @@ class Clock:
         return {'seconds': time.perf_counter() - self.wall, 'cpu': time.process_time() - self.cpu}
 
 
-def import_plugins(folder):
-    """Runs every Python file of a folder: each registers what it adds to Mitsuba."""
+def import_plugins(mi, folder):
+    """Runs every Python file of a folder: each registers what it adds to Mitsuba. The answer is the kinds of
+    what it adds by name, for Mitsuba's own list tells those of `scalar_rgb` alone."""
+    kinds = {}
+
+    def listed(name, register, kind):
+        def also(plugin, make):
+            kinds[plugin] = kind
+            return register(plugin, make)
+        setattr(mi, name, also)
+
+    for name, kind in REGISTRIES.items():
+        listed(name, getattr(mi, name), getattr(mi.ObjectType, kind))
     sys.path.insert(0, str(folder))
     for path in sorted(Path(folder).glob('*.py')):
         spec = importlib.util.spec_from_file_location(path.stem, path)
         module = importlib.util.module_from_spec(spec)
         sys.modules.setdefault(path.stem, module)
         spec.loader.exec_module(module)
+    return kinds
 
 
 class Parsed:
     """A scene file as Mitsuba's parser leaves it, before anything is built. Nodes are known by number."""
 
-    def __init__(self, mi, order):
-        self.mi = mi
+    def __init__(self, mi, order, added):
+        self.mi, self.variant, self.added = mi, order['variant'], added
         mi.file_resolver().prepend(str(Path(order['scene']).resolve().parent))
         self.config = mi.parser.ParserConfig(order['variant'])
         self.state = mi.parser.parse_file(self.config, order['scene'], **dict(order['defines']))
@@ -77,9 +94,21 @@ class Parsed:
         self.props(parent)['etendue_' + plugin] = self.mi.Properties.ResolvedReference(added)
         return added
 
+    def kind(self, plugin):
+        """What kind of plugin has this name, `Unknown` where none has."""
+        return self.added.get(plugin) or self.mi.PluginManager.instance().plugin_type(plugin)
+
     def exists(self, node):
-        manager = self.mi.PluginManager.instance()
-        return manager.plugin_type(self.props(node).plugin_name()) != self.mi.ObjectType.Unknown
+        return self.kind(self.props(node).plugin_name()) != self.mi.ObjectType.Unknown
+
+    def disambiguate(self):
+        """Mitsuba keeps plugins of all kinds under one set of names: where the plugin of an integrator's name is of
+        another kind, the integrator is looked for under the name with `_integrator`."""
+        wanted = self.mi.ObjectType.Integrator
+        for node in self.all('Integrator'):
+            name = self.props(node).plugin_name()
+            if self.kind(name) != wanted and self.kind(f'{name}_integrator') == wanted:
+                self.props(node).set_plugin_name(f'{name}_integrator')
 
     def replace_samplers(self):
         """How points are placed changes the noise and not the mean: `independent` stands in for the rest."""
@@ -128,13 +157,18 @@ class Parsed:
         scene = built[0] if isinstance(built, list) else built
         if not isinstance(scene, self.mi.Scene) or not scene.sensors():
             raise Refused('Mitsuba finds no scene with a sensor in the file')
+        integrator = type(scene.integrator())
+        if self.variant.startswith('scalar') and not integrator.__module__.startswith('mitsuba'):
+            raise Refused(f'Mitsuba cannot run {integrator.__name__}, an integrator written in Python, in a variant '
+                          'of one ray at a time; take one such as llvm_ad_rgb (--variant)')
         return scene
 
 
-def load(mi, order):
+def load(mi, order, added):
     """The scene, and what was done to it."""
     try:
-        parsed = Parsed(mi, order)
+        parsed = Parsed(mi, order, added)
+        parsed.disambiguate()
         parsed.replace_samplers()
         parsed.refuse_missing()
         parsed.override(order)
@@ -164,12 +198,11 @@ def main():
     if order['threads'] is not None:
         import drjit
         drjit.set_thread_count(order['threads'])
-    if order['plugins'] is not None:
-        import_plugins(order['plugins'])
+    added = import_plugins(mi, order['plugins']) if order['plugins'] is not None else {}
 
     clock = Clock()
     try:
-        scene, notes = load(mi, order)
+        scene, notes = load(mi, order, added)
     except Refused as error:
         return answer('refused', str(error))
     answer('loaded', dict(renderer=f'Mitsuba {mi.__version__}, {order["variant"]}', time=clock.time(),

@@ -323,6 +323,62 @@ fn mitsuba_agrees_and_what_it_lacks_is_named() {
 }
 
 #[test]
+fn plugins_written_in_python_take_part_in_every_variant() {
+    let Some(python) = mitsuba() else {
+        return;
+    };
+    let place = Place::new();
+    let added = r#"
+import mitsuba as mi
+
+class Torch(mi.SamplingIntegrator):
+    def sample(self, scene, sampler, ray, medium=None, active=True):
+        return mi.Color3f(1), True, []
+
+mi.register_bsdf('torch', lambda props: mi.load_dict(dict(type='diffuse')))
+mi.register_integrator('torch_integrator', Torch)
+"#;
+    fs::create_dir(place.path("plugins")).expect("writable");
+    fs::write(place.path("plugins/torch.py"), added).expect("writable");
+    for (name, from, to) in [
+        (
+            "bsdf",
+            r#"<shape type="sphere"/>"#,
+            r#"<shape type="sphere"><bsdf type="torch"/></shape>"#,
+        ),
+        (
+            "integrator",
+            r#"<integrator type="path"><integer name="max_depth" value="3"/></integrator>"#,
+            r#"<integrator type="torch"/>"#,
+        ),
+    ] {
+        let scene = lamp(5.0);
+        assert!(scene.contains(from), "{scene}");
+        let scene = scene.replace(from, to);
+        fs::write(place.path(&format!("{name}.xml")), scene).expect("writable");
+    }
+    let run = |reference: &str, variant: &str, status| {
+        let arguments = format!(
+            "dim.xml --reference {reference}.xml --python {} --plugins plugins --variant {variant} \
+             --seeds 2 --spp 1 --precision 99",
+            python.display()
+        );
+        place.says(status, &arguments)
+    };
+    for variant in ["scalar_rgb", "scalar_spectral"] {
+        let told = run("bsdf", variant, 0);
+        assert!(told.contains(": agree"), "{variant}: {told}");
+        let told = run("integrator", variant, 2);
+        assert!(
+            told.contains(
+                "not comparable: Mitsuba cannot run Torch, an integrator written in Python"
+            ),
+            "{variant}: {told}"
+        );
+    }
+}
+
+#[test]
 fn the_project_s_scenes_agree_with_mitsuba() {
     let Some(python) = mitsuba() else {
         return;

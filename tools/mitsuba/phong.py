@@ -11,7 +11,8 @@ Mitsuba 3.9 cannot run integrators written in Python in `scalar_*`. Properties: 
 
 Set the variant, then import this file: it registers both. Mitsuba keeps plugins of all kinds under one set of
 names. So `phong` makes the integrator where it has one of the properties above, and the BSDF otherwise; an
-integrator without any must give one (`falloff` `none`) or be called `phong_integrator`.
+integrator without any must give one (`falloff` `none`) or be called `phong_integrator`, as `etendue crosscheck`
+does with all.
 """
 import drjit as dr
 import mitsuba as mi
