@@ -200,7 +200,7 @@ pub(super) fn render<C: ColorModel>(
     }
 
     let rest = Rest::new(&grid, &ladder, summed.sums.steps());
-    let units = pilots + rest.units.len();
+    let units = pilots + rest.units();
     if summed.next > units {
         return Err(Error::input(
             "the checkpoint knows of more tiles than there are",
@@ -213,15 +213,18 @@ pub(super) fn render<C: ColorModel>(
             .sum::<u64>()
     };
     let done = summed.next - pilots;
-    progress.begin(Phase::Render, (0..rest.units.len()).map(of_unit).sum());
+    let of_slot = |(slot, count): (usize, &u32)| pixels(slot / 2) * u64::from(*count);
+    progress.begin(
+        Phase::Render,
+        rest.counts.iter().enumerate().map(of_slot).sum(),
+    );
     progress.advance((0..done).map(of_unit).sum(), 0);
     summed = unit::run(units, summed, progress, keeper, |unit| {
         rest.render(job, &ladder, &grid, unit - pilots, progress)
     });
-    let pass_of = |unit: usize| rest.units.get(unit).map_or(rest.passes(), |u| u.pass);
     let completed = Completed {
         samples: ladder.limits()[0],
-        passes: [1 + pass_of(summed.next - pilots), 1 + rest.passes()],
+        passes: [1 + rest.pass(summed.next - pilots), 1 + rest.passes()],
         units: [summed.next, units],
     };
     Ok((summed, completed, ladder))
@@ -273,38 +276,46 @@ struct Rest {
     steps: Vec<usize>,
     /// How many samples that is.
     counts: Vec<u32>,
-    /// Tiles that are not done yet, pass by pass.
-    units: Vec<Unit>,
-}
-
-struct Unit {
-    pass: u32,
-    tile: usize,
+    /// Tiles by their largest count, the largest first: those that a pass takes are the first of them.
+    tiles: Vec<usize>,
+    /// The first unit of each pass, and the number of units.
+    firsts: Vec<usize>,
 }
 
 impl Rest {
     fn new(grid: &Grid, ladder: &Ladder, steps: Vec<usize>) -> Self {
         let counts: Vec<u32> = steps.iter().map(|step| ladder.count(*step)).collect();
-        let most = |tile| {
+        let passes = |tile: usize| {
             let blocks = grid.tile(tile);
             let counts = blocks.map(|b| counts[2 * b].max(counts[2 * b + 1]));
-            counts.max().unwrap_or(0)
+            counts.max().unwrap_or(0).div_ceil(PASS)
         };
-        let most: Vec<u32> = (0..grid.tiles()).map(most).collect();
-        let passes = most.iter().max().map_or(0, |n| n.div_ceil(PASS));
-        let units = (0..passes)
-            .flat_map(|pass| (0..grid.tiles()).map(move |tile| Unit { pass, tile }))
-            .filter(|unit| most[unit.tile] > unit.pass * PASS)
-            .collect();
+        let mut tiles: Vec<usize> = (0..grid.tiles()).collect();
+        tiles.sort_by_key(|tile| std::cmp::Reverse(passes(*tile)));
+        let mut firsts = vec![0];
+        for pass in 0..tiles.first().map_or(0, |tile| passes(*tile)) {
+            let taken = tiles.partition_point(|tile| passes(*tile) > pass);
+            firsts.push(firsts[pass as usize] + taken);
+        }
         Self {
             steps,
             counts,
-            units,
+            tiles,
+            firsts,
         }
     }
 
+    fn units(&self) -> usize {
+        self.firsts[self.firsts.len() - 1]
+    }
+
     fn passes(&self) -> u32 {
-        self.units.last().map_or(0, |unit| unit.pass + 1)
+        self.firsts.len() as u32 - 1
+    }
+
+    /// The pass of a unit; after the last unit, the number of passes.
+    fn pass(&self, unit: usize) -> u32 {
+        self.firsts[1..].partition_point(|first| *first <= unit) as u32
     }
 
     /// The halves of blocks that a unit adds to, each with the indices of its samples.
@@ -313,7 +324,8 @@ impl Rest {
         grid: &Grid,
         unit: usize,
     ) -> impl Iterator<Item = (usize, std::ops::Range<u32>)> {
-        let Unit { pass, tile } = self.units[unit];
+        let pass = self.pass(unit);
+        let tile = self.tiles[unit - self.firsts[pass as usize]];
         grid.tile(tile)
             .flat_map(|block| [2 * block, 2 * block + 1])
             .filter_map(move |slot| {
