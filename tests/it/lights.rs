@@ -23,7 +23,7 @@ fn reflected(light: &str, at: [f64; 2], integrator: &str) -> f64 {
                 <integer name="width" value="1"/><integer name="height" value="1"/>
                 <rfilter type="box"/>
             </film>
-            <sampler type="stratified"><integer name="sample_count" value="65536"/></sampler>
+            <sampler type="sobol"><integer name="sample_count" value="65536"/></sampler>
         </sensor>{light}
         <shape type="rectangle">
             <transform name="to_world"><scale value="10"/></transform>
