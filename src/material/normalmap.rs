@@ -1,23 +1,21 @@
 //! `normalmap`: turns the normal of the nested material to that of the texture `normalmap`, whose values
 //! in [0, 1] stand for components in [−1, 1] in the shading frame; images want `raw`.
 
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 
-use super::perturbed::Perturbed;
-use super::{Bsdf, BsdfSample, BsdfValue, Lobes, PhongTerms};
+use super::perturbed::{Normals, Perturbed};
 use crate::color::{Color, ColorModel, Rgb, Role};
 use crate::description::Properties;
 use crate::error::Result;
 use crate::interaction::Interaction;
-use crate::math::Frame;
 use crate::texture::{Palettes, Texture};
 
 /// A material on a surface with given normals.
+pub(super) type NormalMap<C> = Perturbed<C, Mapped>;
+
+/// Normals that a texture holds.
 #[derive(Clone, Debug)]
-pub struct NormalMap<C: ColorModel> {
-    material: Perturbed<C>,
-    normals: Texture<Rgb>,
-}
+pub struct Mapped(Texture<Rgb>);
 
 impl<C: ColorModel> NormalMap<C> {
     pub(super) fn build(properties: &Properties<'_>, palettes: &Palettes<C>) -> Result<Self> {
@@ -26,58 +24,14 @@ impl<C: ColorModel> NormalMap<C> {
         }
         let flat = Color::Rgb([0.5, 0.5, 1.0]);
         let vectors = &palettes.vectors;
-        Ok(Self {
-            material: Perturbed::build(properties, palettes)?,
-            normals: vectors.texture(properties, "normalmap", Role::Quantity, flat)?,
-        })
-    }
-
-    /// The frame of the texture's normal, in coordinates of the shading frame.
-    fn frame(&self, at: &Interaction<'_>, wi: Vec3) -> Frame {
-        let value = self.normals.eval(at, &());
-        let n = Vec3::from_array(value.0) * 2.0 - 1.0;
-        self.material.frame(wi, n, Vec3::X)
+        let normals = Mapped(vectors.texture(properties, "normalmap", Role::Quantity, flat)?);
+        Self::around(properties, palettes, normals)
     }
 }
 
-impl<C: ColorModel> Bsdf<C> for NormalMap<C> {
-    fn lobes(&self) -> Lobes {
-        self.material.nested.lobes()
-    }
-
-    fn eval(
-        &self,
-        at: &Interaction<'_>,
-        wi: Vec3,
-        wo: Vec3,
-        w: &C::Wavelengths,
-    ) -> Option<BsdfValue<C::Sample>> {
-        self.material.eval(at, &self.frame(at, wi), wi, wo, w)
-    }
-
-    fn sample(
-        &self,
-        at: &Interaction<'_>,
-        wi: Vec3,
-        u1: f32,
-        u2: Vec2,
-        w: &C::Wavelengths,
-    ) -> Option<BsdfSample<C::Sample>> {
-        let frame = self.frame(at, wi);
-        self.material.sample(at, &frame, wi, (u1, u2), w)
-    }
-
-    fn phong(
-        &self,
-        at: &Interaction<'_>,
-        wi: Vec3,
-        wo: Vec3,
-        w: &C::Wavelengths,
-    ) -> Option<PhongTerms<C::Sample>> {
-        self.material.phong(at, &self.frame(at, wi), wi, wo, w)
-    }
-
-    fn ambient(&self, at: &Interaction<'_>, wi: Vec3, w: &C::Wavelengths) -> C::Sample {
-        self.material.ambient(at, &self.frame(at, wi), wi, w)
+impl Normals for Mapped {
+    fn normal(&self, at: &Interaction<'_>) -> (Vec3, Vec3) {
+        let value = self.0.eval(at, &());
+        (Vec3::from_array(value.0) * 2.0 - 1.0, Vec3::X)
     }
 }

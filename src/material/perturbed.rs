@@ -4,7 +4,7 @@
 
 use glam::{Vec2, Vec3};
 
-use super::{BsdfSample, BsdfValue, Material, PhongTerms, nested};
+use super::{Bsdf, BsdfSample, BsdfValue, Lobes, Material, PhongTerms, nested};
 use crate::color::ColorModel;
 use crate::description::Properties;
 use crate::error::Result;
@@ -12,28 +12,41 @@ use crate::interaction::Interaction;
 use crate::math::Frame;
 use crate::texture::Palettes;
 
-/// The nested material and how it is turned.
+/// Where the normals of a surface point.
+pub trait Normals: std::fmt::Debug + Send + Sync {
+    /// The normal, of any length, and the direction that the frame's s follows; both in the shading frame.
+    fn normal(&self, at: &Interaction<'_>) -> (Vec3, Vec3);
+}
+
+/// A material on a surface with other normals than its own.
 #[derive(Clone, Debug)]
-pub(super) struct Perturbed<C: ColorModel> {
-    pub(super) nested: Box<Material<C>>,
+pub struct Perturbed<C: ColorModel, N> {
+    normals: N,
+    nested: Box<Material<C>>,
     flip_invalid_normals: bool,
     use_shadowing_function: bool,
 }
 
-impl<C: ColorModel> Perturbed<C> {
-    pub(super) fn build(properties: &Properties<'_>, palettes: &Palettes<C>) -> Result<Self> {
+impl<C: ColorModel, N: Normals> Perturbed<C, N> {
+    pub(super) fn around(
+        properties: &Properties<'_>,
+        palettes: &Palettes<C>,
+        normals: N,
+    ) -> Result<Self> {
         let mut nested = nested(properties, palettes, 1..=1)?;
         let switch = |name| Ok::<_, crate::error::Error>(properties.boolean(name)?.unwrap_or(true));
         Ok(Self {
+            normals,
             nested: Box::new(nested.remove(0)),
             flip_invalid_normals: switch("flip_invalid_normals")?,
             use_shadowing_function: switch("use_shadowing_function")?,
         })
     }
 
-    /// The frame around the normal `n`, in coordinates of the surface's shading frame: `n` is turned
-    /// about z where it would face away from `wi`; s follows `tangent`.
-    pub(super) fn frame(&self, wi: Vec3, n: Vec3, tangent: Vec3) -> Frame {
+    /// The frame around the normal, in coordinates of the surface's shading frame: the normal is turned about z
+    /// where it would face away from `wi`.
+    fn frame(&self, at: &Interaction<'_>, wi: Vec3) -> Frame {
+        let (n, tangent) = self.normals.normal(at);
         let away = wi.z * wi.dot(n) <= 0.0;
         let n = if away && self.flip_invalid_normals {
             Vec3::new(-n.x, -n.y, n.z)
@@ -53,71 +66,72 @@ impl<C: ColorModel> Perturbed<C> {
         let alpha2 = (0.125 * tan2(frame.n)).min(1.0);
         2.0 / (1.0 + (1.0 + alpha2 * tan2(wo)).sqrt())
     }
+}
 
-    pub(super) fn eval(
+impl<C: ColorModel, N: Normals> Bsdf<C> for Perturbed<C, N> {
+    fn lobes(&self) -> Lobes {
+        self.nested.lobes()
+    }
+
+    fn eval(
         &self,
         at: &Interaction<'_>,
-        frame: &Frame,
         wi: Vec3,
         wo: Vec3,
         w: &C::Wavelengths,
     ) -> Option<BsdfValue<C::Sample>> {
+        let frame = self.frame(at, wi);
         let turned = frame.to_local(wo);
         if turned.z * wo.z <= 0.0 {
             return None;
         }
-        let (inner, wi) = turned_interaction(at, frame, wi);
+        let (inner, wi) = turned_interaction(at, &frame, wi);
         let value = self.nested.eval(&inner, wi, turned, w)?;
         Some(BsdfValue {
-            value: value.value * self.shadowing(frame, wo),
+            value: value.value * self.shadowing(&frame, wo),
             pdf: value.pdf,
         })
     }
 
-    /// The terms about the turned normal; the textbook knows no shadowing of bumps.
-    pub(super) fn phong(
+    fn sample(
         &self,
         at: &Interaction<'_>,
-        frame: &Frame,
+        wi: Vec3,
+        u1: f32,
+        u2: Vec2,
+        w: &C::Wavelengths,
+    ) -> Option<BsdfSample<C::Sample>> {
+        let frame = self.frame(at, wi);
+        let (inner, wi) = turned_interaction(at, &frame, wi);
+        let sample = self.nested.sample(&inner, wi, u1, u2, w)?;
+        let wo = frame.to_world(sample.wo);
+        (sample.wo.z * wo.z > 0.0).then(|| BsdfSample {
+            wo,
+            weight: sample.weight * self.shadowing(&frame, wo),
+            ..sample
+        })
+    }
+
+    /// The terms about the turned normal; the textbook knows no shadowing of bumps.
+    fn phong(
+        &self,
+        at: &Interaction<'_>,
         wi: Vec3,
         wo: Vec3,
         w: &C::Wavelengths,
     ) -> Option<PhongTerms<C::Sample>> {
+        let frame = self.frame(at, wi);
         let turned = frame.to_local(wo);
         if turned.z * wo.z <= 0.0 {
             return None;
         }
-        let (inner, wi) = turned_interaction(at, frame, wi);
+        let (inner, wi) = turned_interaction(at, &frame, wi);
         self.nested.phong(&inner, wi, turned, w)
     }
 
-    pub(super) fn ambient(
-        &self,
-        at: &Interaction<'_>,
-        frame: &Frame,
-        wi: Vec3,
-        w: &C::Wavelengths,
-    ) -> C::Sample {
-        let (inner, wi) = turned_interaction(at, frame, wi);
+    fn ambient(&self, at: &Interaction<'_>, wi: Vec3, w: &C::Wavelengths) -> C::Sample {
+        let (inner, wi) = turned_interaction(at, &self.frame(at, wi), wi);
         self.nested.ambient(&inner, wi, w)
-    }
-
-    pub(super) fn sample(
-        &self,
-        at: &Interaction<'_>,
-        frame: &Frame,
-        wi: Vec3,
-        u: (f32, Vec2),
-        w: &C::Wavelengths,
-    ) -> Option<BsdfSample<C::Sample>> {
-        let (inner, wi) = turned_interaction(at, frame, wi);
-        let sample = self.nested.sample(&inner, wi, u.0, u.1, w)?;
-        let wo = frame.to_world(sample.wo);
-        (sample.wo.z * wo.z > 0.0).then(|| BsdfSample {
-            wo,
-            weight: sample.weight * self.shadowing(frame, wo),
-            ..sample
-        })
     }
 }
 
