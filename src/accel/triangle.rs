@@ -18,6 +18,18 @@ pub(super) struct Shear {
     pub(super) shear: [f32; 2],
 }
 
+/// The axis of the greatest of three, by whether the first is greater than the second, the first than the third,
+/// and the second than the third.
+const GREATEST: [usize; 8] = [2, 2, 2, 0, 1, 2, 1, 0];
+
+/// For each axis as z the other two: in their order, and changed round for a ray that goes backwards along z, so
+/// that winding is kept.
+const AXES: [[[usize; 3]; 2]; 3] = [
+    [[1, 2, 0], [2, 1, 0]],
+    [[2, 0, 1], [0, 2, 1]],
+    [[0, 1, 2], [1, 0, 2]],
+];
+
 /// The smaller, the second where they cannot be compared: as processors have it.
 #[inline(always)]
 pub(super) fn least(a: f32, b: f32) -> f32 {
@@ -34,25 +46,15 @@ impl Shear {
     #[inline]
     pub(super) fn new(ray: &Ray) -> Self {
         let d = ray.direction.to_array();
-        let magnitude = d.map(f32::abs);
-        let z = if magnitude[0] > magnitude[1] && magnitude[0] > magnitude[2] {
-            0
-        } else if magnitude[1] > magnitude[2] {
-            1
-        } else {
-            2
-        };
-        // Winding is kept where the ray goes backwards along z.
-        let (after, before) = ([1, 2, 0][z], [2, 0, 1][z]);
-        let (x, y) = if d[z] < 0.0 {
-            (before, after)
-        } else {
-            (after, before)
-        };
+        let [a, b, c] = d.map(f32::abs);
+        // Looked up, not branched on: nobody can foretell it.
+        let z = GREATEST[usize::from(a > b) | usize::from(a > c) << 1 | usize::from(b > c) << 2];
+        let axes = AXES[z][usize::from(d[z] < 0.0)];
+        let [x, y, z] = axes;
         Self {
             origin: ray.origin,
             direction: ray.direction,
-            axes: [x, y, z],
+            axes,
             shear: [d[x] / d[z], d[y] / d[z]],
         }
     }
@@ -88,9 +90,8 @@ impl Shear {
 
     /// Whether edge functions are all of one sign, where zero has both, and not all zero.
     #[inline(always)]
-    pub(super) fn inside([u, v, w]: [f32; 3]) -> bool {
-        let (low, high) = (least(u, least(v, w)), greatest(u, greatest(v, w)));
-        (low >= 0.0) != (high <= 0.0)
+    pub(super) fn inside(edges: [f32; 3]) -> bool {
+        edges.iter().all(|e| *e >= 0.0) != edges.iter().all(|e| *e <= 0.0)
     }
 
     /// The second and third barycentric coordinates.
@@ -103,10 +104,9 @@ impl Shear {
     /// Where the ray meets the triangle's plane.
     #[inline(always)]
     pub(super) fn distance(&self, corners: [Vec3; 3]) -> f32 {
-        let origin = self.origin.as_dvec3();
-        let [a, b, c] = corners.map(|p| p.as_dvec3() - origin);
+        let [a, b, c] = corners.map(Vec3::as_dvec3);
         let normal = (b - a).cross(c - a);
-        (normal.dot(a) / normal.dot(self.direction.as_dvec3())) as f32
+        (normal.dot(a - self.origin.as_dvec3()) / normal.dot(self.direction.as_dvec3())) as f32
     }
 }
 

@@ -10,8 +10,8 @@
 
 use std::hint::select_unpredictable;
 
-use super::kernel::Lanes;
-use super::node::{BLOCK_INDEX, DONE, LEAF, OTHER, OTHER_INDEX, WIDTH, triangles_of};
+use super::kernel::{Ends, FILED, Lanes};
+use super::node::{BLOCK_INDEX, DONE, Entry, LEAF, OTHER, OTHER_INDEX, WIDTH, triangles_of};
 use super::state::{Best, Flight, State};
 use super::{Tree, Walker};
 use crate::accel::Counts;
@@ -19,48 +19,24 @@ use crate::accel::Counts;
 /// Rays on their way at once. Fewer wait for memory, more fall out of the nearest cache.
 pub(super) const IN_FLIGHT: usize = 48;
 
+/// Room for a list, to be written to in whole groups.
+type List = [u32; IN_FLIGHT + FILED];
+
 /// Rays by what they do next, as slots.
 struct Lists {
-    nodes: [[u32; IN_FLIGHT]; 2],
-    leaves: [[u32; IN_FLIGHT]; 2],
-    inside: [u32; IN_FLIGHT],
-    rest: [u32; IN_FLIGHT],
-}
-
-/// The ends of the lists to which a round writes.
-struct Ends {
-    nodes: *mut u32,
-    leaves: *mut u32,
-    rest: *mut u32,
-}
-
-impl Ends {
-    /// Puts a ray where `current` belongs, or nowhere where `wanted` is not.
-    ///
-    /// # Safety
-    /// Each list has room for one more.
-    #[inline(always)]
-    unsafe fn file(&mut self, slot: u32, current: u32, wanted: bool) {
-        let leaf = current >= LEAF;
-        let rest = current >= OTHER;
-        // SAFETY: the caller says that there is room.
-        unsafe {
-            *self.nodes = slot;
-            *self.leaves = slot;
-            *self.rest = slot;
-            self.nodes = self.nodes.add(usize::from(!leaf & wanted));
-            self.leaves = self.leaves.add(usize::from((leaf ^ rest) & wanted));
-            self.rest = self.rest.add(usize::from(rest & wanted));
-        }
-    }
+    nodes: [List; 2],
+    leaves: [List; 2],
+    inside: List,
+    rest: List,
+    /// What those of a list that was just taken in hand visit next.
+    currents: List,
 }
 
 /// The tree and the stacks, by pointers.
 #[derive(Clone, Copy)]
 struct Places<'t> {
     tree: &'t Tree,
-    distances: *mut f32,
-    references: *mut u32,
+    stacks: *mut Entry,
 }
 
 impl Places<'_> {
@@ -81,10 +57,9 @@ impl Places<'_> {
                 self.below::<L>(ray)
             };
             let node = self.tree.nodes.get_unchecked(ray.current as usize);
-            let (distances, references) = (self.distances.add(top), self.references.add(top));
-            let count = L::enter::<ANY>(node, ray, distances, references);
+            let count = L::enter(node, ray, self.stacks.add(top));
             ray.top = select_unpredictable(count == 0, below, top as u32 + count - 1);
-            ray.current = *self.references.add(ray.top as usize);
+            ray.current = *self.stacks.add(ray.top as usize) as u32;
         }
     }
 
@@ -96,7 +71,7 @@ impl Places<'_> {
     unsafe fn below<L: Lanes>(self, ray: &State) -> u32 {
         let lowest = ray.top - WIDTH as u32;
         // SAFETY: eight sentinels are at the bottom.
-        lowest + unsafe { L::pop(self.distances.add(lowest as usize), ray.limit) }
+        lowest + unsafe { L::pop(self.stacks.add(lowest as usize), ray.bound) }
     }
 
     /// What comes next where the present leads nowhere.
@@ -112,7 +87,7 @@ impl Places<'_> {
             } else {
                 self.below::<L>(ray)
             };
-            (top, *self.references.add(top as usize))
+            (top, *self.stacks.add(top as usize) as u32)
         }
     }
 
@@ -124,29 +99,28 @@ impl Places<'_> {
     unsafe fn inside<L: Lanes>(self, ray: &mut State) -> u32 {
         let index = (ray.current & BLOCK_INDEX) as usize;
         // SAFETY: the index is a block's.
-        ray.lanes = unsafe { L::inside(self.tree.blocks.get_unchecked(index), ray) };
-        ray.lanes
+        let lanes = unsafe { L::inside(self.tree.blocks.get_unchecked(index), ray) };
+        ray.lanes = lanes as u8;
+        lanes
     }
 
-    /// Takes the best of the triangles that the line goes through; whether the ray is blocked.
+    /// Takes the best of the triangles that the line goes through; whether there is any.
     ///
     /// # Safety
     /// As [`Places::inside`].
     #[inline(always)]
-    unsafe fn meet<L: Lanes, const ANY: bool>(self, ray: &mut State) -> bool {
+    unsafe fn meet<L: Lanes>(self, ray: &mut State) -> bool {
         let index = ray.current & BLOCK_INDEX;
         // SAFETY: the index is a block's.
         let block = unsafe { self.tree.blocks.get_unchecked(index as usize) };
         // SAFETY: the caller has what `L` needs.
         let (t, lane) = unsafe { L::meet(block, ray) };
-        let id = block.ids[lane];
-        let better = (t < ray.limit) | ((t == ray.limit) & (id < ray.id));
-        if !ANY {
-            ray.limit = select_unpredictable(better, t, ray.limit);
-            ray.id = select_unpredictable(better, id, ray.id);
-        }
+        let (id, limit) = (block.ids[lane], ray.limit());
+        let better = (t < limit) | ((t == limit) & (id < ray.id));
+        ray.reach(select_unpredictable(better, t, limit));
+        ray.id = select_unpredictable(better, id, ray.id);
         ray.place = select_unpredictable(better, index << 2 | lane as u32, ray.place);
-        ANY & better
+        better
     }
 
     /// Deals with rays at items that are no triangles, until each is at a node or a block, or done.
@@ -159,7 +133,8 @@ impl Places<'_> {
             let item = ray.current & OTHER_INDEX;
             let found = walker.other(ray.ray as usize, item, ray.best());
             if let Some(Best { t, id, place }) = found {
-                (ray.limit, ray.id, ray.place) = (t, id, place.0);
+                ray.reach(t);
+                (ray.id, ray.place) = (id, place.0);
             }
             if ANY && found.is_some() {
                 ray.current = DONE;
@@ -180,6 +155,9 @@ impl Places<'_> {
             let node = self.tree.nodes.as_ptr().wrapping_add(current as usize);
             let block = self.tree.blocks.as_ptr().wrapping_add(index);
             let at = select_unpredictable(current >= LEAF, block.cast::<i8>(), node.cast());
+            // What is no place in memory would be looked for in all tables of pages.
+            let at =
+                select_unpredictable(current >= OTHER, self.stacks.cast::<i8>().cast_const(), at);
             for line in 0..4 {
                 // SAFETY: a hint never faults, wherever it points.
                 unsafe { _mm_prefetch::<_MM_HINT_T0>(at.wrapping_add(64 * line)) };
@@ -191,8 +169,7 @@ impl Places<'_> {
 fn places<'t>(tree: &'t Tree, flight: &mut Flight) -> Places<'t> {
     Places {
         tree,
-        distances: flight.distances.as_mut_ptr(),
-        references: flight.references.as_mut_ptr(),
+        stacks: flight.stacks.as_mut_ptr(),
     }
 }
 
@@ -210,11 +187,13 @@ pub(super) unsafe fn batch<L: Lanes, W: Walker, const ANY: bool, const FETCH: bo
 ) {
     let places = places(tree, flight);
     let slots = flight.states.len().min(count).min(IN_FLIGHT);
+    const NONE: List = [0; IN_FLIGHT + FILED];
     let mut lists = Lists {
-        nodes: [[0; IN_FLIGHT]; 2],
-        leaves: [[0; IN_FLIGHT]; 2],
-        inside: [0; IN_FLIGHT],
-        rest: [0; IN_FLIGHT],
+        nodes: [NONE; 2],
+        leaves: [NONE; 2],
+        inside: NONE,
+        rest: NONE,
+        currents: NONE,
     };
     let bottoms: [u32; IN_FLIGHT] = std::array::from_fn(|slot| flight.bottom(slot));
     let states = flight.states.as_mut_ptr();
@@ -229,57 +208,58 @@ pub(super) unsafe fn batch<L: Lanes, W: Walker, const ANY: bool, const FETCH: bo
     unsafe {
         let node_lists = lists.nodes.as_mut_ptr();
         let leaf_lists = lists.leaves.as_mut_ptr();
-        let (mut nodes, mut later_nodes) = (node_lists, node_lists.add(1));
-        let (mut leaves, mut later_leaves) = (leaf_lists, leaf_lists.add(1));
+        let (mut nodes, mut later_nodes) = (node_lists.cast::<u32>(), node_lists.add(1).cast());
+        let (mut leaves, mut later_leaves) = (leaf_lists.cast::<u32>(), leaf_lists.add(1).cast());
         let rest = lists.rest.as_mut_ptr();
         let inside = lists.inside.as_mut_ptr();
+        let currents = lists.currents.as_mut_ptr();
         while node_count + leaf_count > 0 {
             node_steps += node_count as u64;
-            let mut ends = Ends {
-                nodes: later_nodes.cast(),
-                leaves: leaves.cast::<u32>().add(leaf_count),
-                rest,
-            };
             for i in 0..node_count {
-                let slot = *nodes.cast::<u32>().add(i);
-                let ray = &mut *states.add(slot as usize);
+                let ray = &mut *states.add(*nodes.add(i) as usize);
                 places.step::<L, ANY>(ray);
-                ends.file(slot, ray.current, true);
+                *currents.add(i) = ray.current;
                 if FETCH {
                     places.fetch(ray.current);
                 }
             }
-            leaf_count = ends.leaves.offset_from(leaves.cast()) as usize;
-            ends.leaves = later_leaves.cast();
+            let mut ends = Ends {
+                nodes: later_nodes,
+                leaves: leaves.add(leaf_count),
+                rest,
+            };
+            L::file(nodes, currents, node_count, &mut ends);
+            leaf_count = ends.leaves.offset_from(leaves) as usize;
             let mut inside_count = 0;
             for i in 0..leaf_count {
-                let slot = *leaves.cast::<u32>().add(i);
+                let slot = *leaves.add(i);
                 let ray = &mut *states.add(slot as usize);
                 triangle_tests += triangles_of(ray.current);
-                let hit = places.inside::<L>(ray) != 0;
                 *inside.add(inside_count) = slot;
-                inside_count += usize::from(hit);
-                let (top, current) = places.next::<L, ANY>(ray);
-                ray.top = select_unpredictable(hit, ray.top, top);
-                ray.current = select_unpredictable(hit, ray.current, current);
-                ends.file(slot, ray.current, !hit);
-                if FETCH {
-                    places.fetch(ray.current);
-                }
+                inside_count += usize::from(places.inside::<L>(ray) != 0);
             }
             for i in 0..inside_count {
                 let slot = *inside.add(i);
                 let ray = &mut *states.add(slot as usize);
-                let blocked = places.meet::<L, ANY>(ray);
-                let (top, current) = places.next::<L, ANY>(ray);
-                ray.top = top;
-                ray.current = select_unpredictable(blocked, DONE, current);
-                ends.file(slot, ray.current, true);
+                let better = places.meet::<L>(ray);
+                if ANY {
+                    // At the bottom nothing is left to be visited.
+                    let bottom = bottoms.get_unchecked(slot as usize) + 1;
+                    ray.top = select_unpredictable(better, bottom, ray.top);
+                }
+            }
+            for i in 0..leaf_count {
+                let ray = &mut *states.add(*leaves.add(i) as usize);
+                (ray.top, ray.current) = places.next::<L, ANY>(ray);
+                *currents.add(i) = ray.current;
                 if FETCH {
                     places.fetch(ray.current);
                 }
             }
+            ends.leaves = later_leaves;
+            L::file(leaves, currents, leaf_count, &mut ends);
             let rest_count = ends.rest.offset_from(rest) as usize;
+            let mut ready = 0;
             for i in 0..rest_count {
                 let slot = *rest.add(i);
                 let ray = &mut *states.add(slot as usize);
@@ -292,11 +272,18 @@ pub(super) unsafe fn batch<L: Lanes, W: Walker, const ANY: bool, const FETCH: bo
                     ray.begin(next as u32, &walker.start(next), bottoms[slot as usize]);
                     next += 1;
                 }
-                ends.rest = rest;
-                ends.file(slot, ray.current, true);
+                *rest.add(ready) = slot;
+                *currents.add(ready) = ray.current;
+                ready += 1;
             }
-            node_count = ends.nodes.offset_from(later_nodes.cast()) as usize;
-            leaf_count = ends.leaves.offset_from(later_leaves.cast()) as usize;
+            // Written behind the others, which have been read.
+            let mut again = Ends {
+                rest: inside,
+                ..ends
+            };
+            L::file(rest, currents, ready, &mut again);
+            node_count = again.nodes.offset_from(later_nodes) as usize;
+            leaf_count = again.leaves.offset_from(later_leaves) as usize;
             (nodes, later_nodes) = (later_nodes, nodes);
             (leaves, later_leaves) = (later_leaves, leaves);
         }
@@ -327,9 +314,9 @@ pub(super) unsafe fn single<L: Lanes, W: Walker, const ANY: bool>(
                 places.step::<L, ANY>(&mut ray);
             } else if ray.current < OTHER {
                 counts.primitive_tests += u64::from(triangles_of(ray.current));
-                let blocked = places.inside::<L>(&mut ray) != 0 && places.meet::<L, ANY>(&mut ray);
+                let blocked = places.inside::<L>(&mut ray) != 0 && places.meet::<L>(&mut ray);
                 (ray.top, ray.current) = places.next::<L, ANY>(&ray);
-                if blocked {
+                if ANY && blocked {
                     break;
                 }
             } else {

@@ -276,8 +276,16 @@ impl Part {
             "fewer than 2³⁰ other items"
         );
         let tree = Tree {
-            nodes: self.nodes,
-            blocks: self.blocks,
+            nodes: {
+                let mut n = super::huge::Huge::filled(self.nodes.len(), Node::EMPTY);
+                n.copy_from_slice(&self.nodes);
+                n
+            },
+            blocks: {
+                let mut n = super::huge::Huge::filled(self.blocks.len(), Block::EMPTY);
+                n.copy_from_slice(&self.blocks);
+                n
+            },
             levels: self.levels,
         };
         (tree, self.others)

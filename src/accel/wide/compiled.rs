@@ -56,9 +56,9 @@ pub(super) fn single<W: Walker, const ANY: bool>(
 /// A module with both walks, compiled for some instructions.
 #[cfg(target_arch = "x86_64")]
 macro_rules! compile {
-    ($name:ident, $lanes:ident, $features:literal) => {
+    ($name:ident, $kernel:ident::$lanes:ident, $features:literal) => {
         mod $name {
-            use super::super::avx::$lanes;
+            use super::super::$kernel::$lanes;
             use super::{Counts, Flight, Tree, Walker, walks};
 
             /// # Safety
@@ -94,10 +94,10 @@ macro_rules! compile {
 }
 
 #[cfg(target_arch = "x86_64")]
-compile!(avx2, Avx2, "avx2,bmi1,bmi2,lzcnt,popcnt");
+compile!(avx2, avx::Avx2, "avx2,fma,bmi1,bmi2,lzcnt,popcnt");
 #[cfg(target_arch = "x86_64")]
 compile!(
     avx512,
-    Avx512,
-    "avx512f,avx512vl,avx512dq,avx512bw,avx2,bmi1,bmi2,lzcnt,popcnt"
+    avx512::Avx512,
+    "avx512f,avx512vl,avx512dq,avx512bw,avx2,fma,bmi1,bmi2,lzcnt,popcnt"
 );

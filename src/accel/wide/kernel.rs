@@ -2,32 +2,26 @@
 
 #![allow(unsafe_code)]
 
-use super::node::{Block, Node};
+use super::node::{Block, Entry, LEAF, Node, OTHER};
 use super::state::State;
 
-/// The four steps of a walk that are done on lanes.
+/// The steps of a walk that are done on lanes.
 ///
 /// # Safety
 /// An implementation may need instructions that not every processor has: its functions must be called, or
 /// rather expanded, only where those may be used.
 pub(super) unsafe trait Lanes: Copy {
-    /// Writes the children that the ray enters, farthest first, and returns how many. With `ANY` their
-    /// distances are not written.
+    /// Writes the children that the ray enters, farthest first, and returns how many.
     ///
     /// # Safety
-    /// Eight entries can be written at each pointer.
-    unsafe fn enter<const ANY: bool>(
-        node: &Node,
-        ray: &State,
-        distances: *mut f32,
-        references: *mut u32,
-    ) -> u32;
+    /// Eight entries can be written.
+    unsafe fn enter(node: &Node, ray: &State, stack: *mut Entry) -> u32;
 
-    /// The last of eight distances that is not beyond the limit; the first where all are.
+    /// The last of eight entries that is within reach; the first where none is.
     ///
     /// # Safety
-    /// Eight distances can be read.
-    unsafe fn pop(distances: *const f32, limit: f32) -> u32;
+    /// Eight entries can be read.
+    unsafe fn pop(stack: *const Entry, bound: Entry) -> u32;
 
     /// A bit for each triangle of the block that the ray's line goes through.
     ///
@@ -41,6 +35,38 @@ pub(super) unsafe trait Lanes: Copy {
     /// # Safety
     /// See the trait.
     unsafe fn meet(block: &Block, ray: &State) -> (f32, usize);
+
+    /// Puts rays, given by their slots and what they visit next, at the ends of the lists where they belong.
+    ///
+    /// # Safety
+    /// The arrays have room up to the next multiple of [`FILED`], and so have the lists behind their ends.
+    #[inline(always)]
+    unsafe fn file(slots: *const u32, currents: *const u32, count: usize, ends: &mut Ends) {
+        for i in 0..count {
+            // SAFETY: the caller says that there is room.
+            unsafe {
+                let (slot, current) = (*slots.add(i), *currents.add(i));
+                let (leaf, rest) = (current >= LEAF, current >= OTHER);
+                // Written to each list, of which only the one that it belongs to grows: nothing branches.
+                *ends.nodes = slot;
+                *ends.leaves = slot;
+                *ends.rest = slot;
+                ends.nodes = ends.nodes.add(usize::from(!leaf));
+                ends.leaves = ends.leaves.add(usize::from(leaf ^ rest));
+                ends.rest = ends.rest.add(usize::from(rest));
+            }
+        }
+    }
+}
+
+/// As many rays are filed at once.
+pub(super) const FILED: usize = 16;
+
+/// The ends of the lists to which a round writes.
+pub(super) struct Ends {
+    pub(super) nodes: *mut u32,
+    pub(super) leaves: *mut u32,
+    pub(super) rest: *mut u32,
 }
 
 /// Instructions with which rays are traced. All find the same hits, to the bit.
@@ -63,6 +89,7 @@ impl Kernel {
         #[cfg(target_arch = "x86_64")]
         {
             let avx2 = is_x86_feature_detected!("avx2")
+                && is_x86_feature_detected!("fma")
                 && is_x86_feature_detected!("bmi1")
                 && is_x86_feature_detected!("bmi2")
                 && is_x86_feature_detected!("lzcnt")

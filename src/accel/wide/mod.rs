@@ -7,10 +7,13 @@
 
 #[cfg(target_arch = "x86_64")]
 mod avx;
+#[cfg(target_arch = "x86_64")]
+mod avx512;
 mod batch;
 mod build;
 mod collapse;
 mod compiled;
+mod huge;
 mod kernel;
 mod node;
 mod portable;
@@ -21,6 +24,7 @@ use glam::Vec3;
 use super::triangle::Shear;
 use super::{Build, Counts};
 use crate::shape::Bounds;
+use huge::Huge;
 use node::{BLOCK, Block, Node};
 use state::State;
 
@@ -49,8 +53,8 @@ pub(super) trait Leaves: Sync {
 #[derive(Debug)]
 pub(super) struct Tree {
     /// The root comes first.
-    nodes: Vec<Node>,
-    blocks: Vec<Block>,
+    nodes: Huge<Node>,
+    blocks: Huge<Block>,
     /// Nodes on the longest way down.
     levels: usize,
 }
@@ -58,8 +62,8 @@ pub(super) struct Tree {
 impl Default for Tree {
     fn default() -> Self {
         Self {
-            nodes: vec![Node::EMPTY],
-            blocks: Vec::new(),
+            nodes: Huge::filled(1, Node::EMPTY),
+            blocks: Huge::filled(0, Block::EMPTY),
             levels: 1,
         }
     }

@@ -13,6 +13,19 @@ pub(super) const WIDTH: usize = 8;
 /// Triangles of a block.
 pub(super) const BLOCK: usize = 4;
 
+/// What stands on a ray's stack: what is to be visited, below the distance at which it is entered. As whole
+/// numbers with a sign, entries are in the order of their distances, but for negative ones, which are before all others.
+pub(super) type Entry = u64;
+
+/// An entry.
+#[inline(always)]
+pub(super) fn entry(distance: f32, reference: u32) -> Entry {
+    u64::from(distance.to_bits()) << 32 | u64::from(reference)
+}
+
+/// At the bottom of a stack: always within reach.
+pub(super) const BOTTOM: Entry = (f32::NEG_INFINITY.to_bits() as u64) << 32 | DONE as u64;
+
 /// Names a block rather than a node.
 pub(super) const LEAF: u32 = 1 << 31;
 /// With [`LEAF`]: names an item that is no triangle.
@@ -39,7 +52,7 @@ pub(super) struct Node {
     /// largest, at the infinities.
     pub(super) slabs: [[f32; WIDTH]; 6],
     pub(super) children: [u32; WIDTH],
-    /// In which order to look at the lanes, farthest first: three bits for each octant of directions.
+    /// In which order to look at the lanes, farthest first, for each octant of directions: three bits a lane.
     pub(super) order: [u32; WIDTH],
 }
 
@@ -73,7 +86,7 @@ impl Node {
             let mut lanes: [usize; WIDTH] = std::array::from_fn(|lane| lane);
             lanes.sort_by(|a, b| depth(*b).total_cmp(&depth(*a)));
             for (place, lane) in lanes.into_iter().enumerate() {
-                node.order[place] |= (lane as u32) << (3 * octant);
+                node.order[octant] |= (lane as u32) << (3 * place);
             }
         }
         node
@@ -91,13 +104,15 @@ pub(super) struct Block {
 }
 
 impl Block {
+    pub(super) const EMPTY: Self = Self {
+        corners: [[[f32::NAN; BLOCK]; 3]; 3],
+        ids: [u32::MAX; BLOCK],
+    };
+
     /// A block of triangles, each with its number; one to four.
     pub(super) fn new(triangles: &mut [(u32, [Vec3; 3])]) -> Self {
         triangles.sort_unstable_by_key(|(id, _)| *id);
-        let mut block = Self {
-            corners: [[[f32::NAN; BLOCK]; 3]; 3],
-            ids: [u32::MAX; BLOCK],
-        };
+        let mut block = Self::EMPTY;
         for (lane, (id, corners)) in triangles.iter().enumerate() {
             block.ids[lane] = *id;
             for axis in 0..3 {

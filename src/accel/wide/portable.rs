@@ -3,7 +3,7 @@
 #![allow(unsafe_code)]
 
 use super::kernel::Lanes;
-use super::node::{BLOCK, Block, Node, WIDTH};
+use super::node::{BLOCK, Block, Entry, Node, WIDTH, entry};
 use super::state::State;
 use crate::accel::boxes::WIDEN;
 use crate::accel::triangle::{Shear, greatest, least};
@@ -16,35 +16,26 @@ pub(super) struct Portable;
 // SAFETY: it needs nothing of the processor, and writes eight entries at the pointers at most.
 unsafe impl Lanes for Portable {
     #[inline(always)]
-    unsafe fn enter<const ANY: bool>(
-        node: &Node,
-        ray: &State,
-        distances: *mut f32,
-        references: *mut u32,
-    ) -> u32 {
+    unsafe fn enter(node: &Node, ray: &State, stack: *mut Entry) -> u32 {
         let mut near = [0.0_f32; WIDTH];
         let mut far = [f32::INFINITY; WIDTH];
         for axis in 0..3 {
-            let first = (ray.near[axis] / 32) as usize;
+            let first = usize::from(ray.near[axis] / 32);
             let (entering, leaving) = (&node.slabs[first], &node.slabs[first ^ 1]);
             for lane in 0..WIDTH {
-                let enter = (entering[lane] - ray.origin[axis]) * ray.inverse[axis];
-                let leave = (leaving[lane] - ray.origin[axis]) * ray.inverse[axis];
+                let enter = entering[lane].mul_add(ray.inverse[axis], ray.entering[axis]);
+                let leave = leaving[lane].mul_add(ray.inverse[axis], ray.leaving[axis]);
                 near[lane] = greatest(near[lane], enter);
                 far[lane] = least(far[lane], leave);
             }
         }
+        let order = node.order[usize::from(ray.octant)];
         let mut count = 0;
-        for place in node.order {
-            let lane = (place >> ray.octant & 7) as usize;
-            if near[lane] <= least(far[lane] * WIDEN, ray.limit) {
+        for place in 0..WIDTH {
+            let lane = (order >> (3 * place) & 7) as usize;
+            if near[lane] <= least(far[lane] * WIDEN, ray.limit()) {
                 // SAFETY: at most eight entries are written, for which the caller has room.
-                unsafe {
-                    *references.add(count) = node.children[lane];
-                    if !ANY {
-                        *distances.add(count) = near[lane];
-                    }
-                }
+                unsafe { *stack.add(count) = entry(near[lane], node.children[lane]) };
                 count += 1;
             }
         }
@@ -52,10 +43,11 @@ unsafe impl Lanes for Portable {
     }
 
     #[inline(always)]
-    unsafe fn pop(distances: *const f32, limit: f32) -> u32 {
+    unsafe fn pop(stack: *const Entry, bound: Entry) -> u32 {
         // SAFETY: the caller says that eight can be read.
-        let distances = unsafe { &*distances.cast::<[f32; WIDTH]>() };
-        distances.iter().rposition(|d| *d <= limit).unwrap_or(0) as u32
+        let entries = unsafe { &*stack.cast::<[Entry; WIDTH]>() };
+        let within = |entry: &Entry| entry.cast_signed() <= bound.cast_signed();
+        entries.iter().rposition(within).unwrap_or(0) as u32
     }
 
     #[inline(always)]

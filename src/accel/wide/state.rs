@@ -1,7 +1,11 @@
 //! A ray on its way through a wide tree, prepared as the kernels want it, and the memory in which dozens
 //! of rays have their stacks.
 
-use super::node::{DONE, WIDTH};
+use std::hint::select_unpredictable;
+
+use glam::Vec3;
+
+use super::node::{BOTTOM, DONE, Entry, WIDTH, entry};
 use crate::accel::boxes::RayBoxes;
 use crate::accel::triangle::Shear;
 use crate::interaction::Ray;
@@ -47,59 +51,76 @@ impl Place {
     pub(in crate::accel) const OUTSIDE: Self = Self(u32::MAX - 1);
 }
 
-/// A ray on its way.
+/// A ray on its way. The first cache line is what a node needs, the second what a block needs.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(super) struct State {
-    pub(super) origin: [f32; 3],
-    /// The distance beyond which nothing counts.
-    pub(super) limit: f32,
+    /// As in [`RayBoxes`].
     pub(super) inverse: [f32; 3],
-    pub(super) entry: f32,
+    pub(super) entering: [f32; 3],
+    pub(super) leaving: [f32; 3],
     /// Where in a node the planes are that the ray meets first, in bytes, axis by axis.
-    pub(super) near: [u32; 3],
-    /// Three times the octant of the direction.
-    pub(super) octant: u32,
+    pub(super) near: [u8; 3],
+    /// The octant of the direction, a bit an axis.
+    pub(super) octant: u8,
+    /// The greatest entry that is within reach: the distance beyond which nothing counts, and ones.
+    pub(super) bound: Entry,
     /// What to visit.
     pub(super) current: u32,
     /// The first free place on the stack.
     pub(super) top: u32,
     pub(super) place: u32,
     pub(super) id: u32,
+    pub(super) origin: [f32; 3],
+    pub(super) direction: [f32; 3],
     /// The origin along the shear's axes.
     pub(super) sheared_origin: [f32; 3],
     pub(super) shear: [f32; 2],
     /// Where in a block the axes of the shear are, in bytes.
-    pub(super) axes: [u32; 3],
-    pub(super) direction: [f32; 3],
+    pub(super) axes: [u8; 3],
+    /// Lanes of the block under way whose triangles the ray goes through.
+    pub(super) lanes: u8,
+    pub(super) entry: f32,
     /// The ray's place in its batch.
     pub(super) ray: u32,
-    /// Lanes of the block under way whose triangles the ray goes through.
-    pub(super) lanes: u32,
 }
 
 /// A node's slabs of one axis, and a block's corners of one axis, in bytes.
-const NODE_AXIS: u32 = 64;
-const BLOCK_AXIS: u32 = 48;
+const NODE_AXIS: u8 = 64;
+const BLOCK_AXIS: u8 = 48;
+
+/// [`State::near`] by octant.
+const NEAR: [[u8; 3]; 8] = {
+    let mut near = [[0; 3]; 8];
+    let mut i = 0;
+    while i < 24 {
+        let (octant, axis) = (i / 3, i % 3);
+        near[octant][axis] = NODE_AXIS * axis as u8 + NODE_AXIS / 2 * (octant >> axis & 1) as u8;
+        i += 1;
+    }
+    near
+};
 
 impl State {
     pub(super) const IDLE: Self = Self {
-        origin: [0.0; 3],
-        limit: f32::NEG_INFINITY,
         inverse: [1.0; 3],
-        entry: 0.0,
+        entering: [0.0; 3],
+        leaving: [0.0; 3],
         near: [0, NODE_AXIS, 2 * NODE_AXIS],
         octant: 0,
+        bound: BOTTOM,
         current: DONE,
         top: 0,
         place: 0,
         id: 0,
+        origin: [0.0; 3],
+        direction: [0.0; 3],
         sheared_origin: [0.0; 3],
         shear: [0.0; 2],
         axes: [0, BLOCK_AXIS, 2 * BLOCK_AXIS],
-        direction: [0.0; 3],
-        ray: 0,
         lanes: 0,
+        entry: 0.0,
+        ray: 0,
     };
 
     /// Puts a ray at the root; `bottom` is its stack's.
@@ -108,37 +129,47 @@ impl State {
         let (boxes, shear) = (RayBoxes::new(&start.ray), Shear::new(&start.ray));
         let origin = start.ray.origin.to_array();
         // A ray that is not finite meets nothing, and its comparisons would go any way.
-        let sound = start.ray.origin.is_finite() && start.ray.direction.is_finite();
+        let nought = 0.0 * start.ray.origin + 0.0 * start.ray.direction;
+        let sound = nought.x + nought.y + nought.z == 0.0;
         // Field by field: a whole state would be made elsewhere and copied, which took most of the time.
-        self.origin = origin;
-        self.limit = if sound {
-            start.best.t
-        } else {
-            f32::NEG_INFINITY
-        };
         self.inverse = boxes.inverse.to_array();
-        self.entry = start.entry;
-        self.octant = 0;
+        self.entering = boxes.entering.to_array();
+        self.leaving = boxes.leaving.to_array();
+        let backward = boxes.inverse.cmplt(Vec3::ZERO).bitmask();
+        self.octant = backward as u8;
+        self.near = NEAR[backward as usize];
         for axis in 0..3 {
-            let backward = u32::from(self.inverse[axis] < 0.0);
-            self.near[axis] = (2 * axis as u32 + backward) * (NODE_AXIS / 2);
-            self.octant += (3 * backward) << axis;
             self.sheared_origin[axis] = origin[shear.axes[axis]];
-            self.axes[axis] = shear.axes[axis] as u32 * BLOCK_AXIS;
+            self.axes[axis] = shear.axes[axis] as u8 * BLOCK_AXIS;
         }
-        self.shear = shear.shear;
-        self.direction = start.ray.direction.to_array();
+        self.reach(select_unpredictable(sound, start.best.t, f32::NEG_INFINITY));
         self.current = 0;
         self.top = bottom + SENTINELS as u32;
         self.place = start.best.place.0;
         self.id = start.best.id;
+        self.origin = origin;
+        self.direction = start.ray.direction.to_array();
+        self.shear = shear.shear;
+        self.entry = start.entry;
         self.ray = ray;
+    }
+
+    /// The distance beyond which nothing counts.
+    #[inline(always)]
+    pub(super) fn limit(&self) -> f32 {
+        f32::from_bits((self.bound >> 32) as u32)
+    }
+
+    /// Sets that distance.
+    #[inline(always)]
+    pub(super) fn reach(&mut self, limit: f32) {
+        self.bound = entry(limit, u32::MAX);
     }
 
     #[inline(always)]
     pub(super) fn best(&self) -> Best {
         Best {
-            t: self.limit,
+            t: self.limit(),
             id: self.id,
             place: Place(self.place),
         }
@@ -159,23 +190,22 @@ impl State {
     #[inline(always)]
     pub(super) fn boxes(&self) -> RayBoxes {
         RayBoxes {
-            origin: self.origin.into(),
             inverse: self.inverse.into(),
+            entering: self.entering.into(),
+            leaving: self.leaving.into(),
         }
     }
 }
 
-/// Entries at a stack's bottom that say [`DONE`], at distance −∞: a kernel looks at eight at once.
+/// Entries [`BOTTOM`] of a stack: a kernel looks at eight at once.
 const SENTINELS: usize = WIDTH;
 
 /// Room for rays on their way.
 #[derive(Debug, Default)]
 pub(in crate::accel) struct Flight {
     pub(super) states: Vec<State>,
-    /// Stacks one after another: at what distance what is to be visited is entered,
-    pub(super) distances: Vec<f32>,
-    /// and what it is.
-    pub(super) references: Vec<u32>,
+    /// One after another.
+    pub(super) stacks: Vec<Entry>,
     stride: usize,
     levels: usize,
 }
@@ -185,12 +215,11 @@ impl Flight {
     pub(in crate::accel) fn new(rays: usize, levels: usize) -> Self {
         // Each level leaves up to seven children on the stack; the eighth is on its way down. A kernel
         // writes eight at once. An odd multiple of a cache line keeps stacks off each other's lines.
-        let stride = (SENTINELS + (WIDTH - 1) * levels + 2 * WIDTH).div_ceil(16);
-        let stride = (stride | 1) * 16;
+        let stride = (SENTINELS + (WIDTH - 1) * levels + 2 * WIDTH).div_ceil(8);
+        let stride = (stride | 1) * 8;
         Self {
             states: vec![State::IDLE; rays],
-            distances: vec![f32::NEG_INFINITY; rays * stride],
-            references: vec![DONE; rays * stride],
+            stacks: vec![BOTTOM; rays * stride],
             stride,
             levels,
         }

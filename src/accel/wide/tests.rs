@@ -4,8 +4,8 @@
 
 use glam::Vec3;
 
-use super::kernel::Lanes;
-use super::node::WIDTH;
+use super::kernel::{Ends, FILED, Lanes};
+use super::node::{BOTTOM, DONE, Entry, LEAF, OTHER, WIDTH, entry};
 use super::portable::Portable;
 use super::*;
 use crate::interaction::Ray;
@@ -44,7 +44,7 @@ fn ray(i: u32) -> State {
     };
     let mut state = State::IDLE;
     state.begin(0, &start, 0);
-    state.lanes = random::bits(5, i) as u32 & 15;
+    state.lanes = random::bits(5, i) as u8 & 15;
     state
 }
 
@@ -75,19 +75,17 @@ fn answers<L: Lanes>() -> Vec<u32> {
     let mut said = Vec::new();
     for i in 0..5000 {
         let (ray, node, block) = (ray(i), node(i), block(i));
-        let (mut distances, mut names) = ([0.0_f32; WIDTH], [0_u32; WIDTH]);
-        let sorted: [f32; WIDTH] = std::array::from_fn(|k| 1.0 + number(9, 8 * i + k as u32));
+        let mut stack: [Entry; WIDTH] = [0; WIDTH];
+        let distance = |k: u32| 1.0 + number(9, 8 * i + k);
+        let mut entries: [Entry; WIDTH] = std::array::from_fn(|k| entry(distance(k as u32), 0));
+        entries[..(i % 9) as usize].fill(BOTTOM);
         // SAFETY: the caller has what the kernel needs; there is room for eight.
         unsafe {
-            let count = L::enter::<false>(&node, &ray, distances.as_mut_ptr(), names.as_mut_ptr());
+            let count = L::enter(&node, &ray, stack.as_mut_ptr());
             said.push(count);
-            said.extend(distances.iter().take(count as usize).map(|d| d.to_bits()));
-            said.extend(names.iter().take(count as usize));
-            assert_eq!(
-                L::enter::<true>(&node, &ray, distances.as_mut_ptr(), names.as_mut_ptr()),
-                count
-            );
-            said.push(L::pop(sorted.as_ptr(), ray.limit));
+            said.extend(stack.iter().take(count as usize).map(|e| (e >> 32) as u32));
+            said.extend(stack.iter().take(count as usize).map(|e| *e as u32));
+            said.push(L::pop(entries.as_ptr(), ray.bound));
             said.push(L::inside(&block, &ray));
             let (t, lane) = L::meet(&block, &ray);
             said.extend(if t.is_nan() {
@@ -104,19 +102,57 @@ fn answers<L: Lanes>() -> Vec<u32> {
 fn every_kernel_takes_the_steps_that_plain_arithmetic_takes() {
     let plain = answers::<Portable>();
     for kernel in Kernel::all() {
-        let said = match kernel.name() {
+        let (said, lists) = match kernel.name() {
             #[cfg(target_arch = "x86_64")]
-            "AVX2" => answers::<avx::Avx2>(),
+            "AVX2" => (answers::<avx::Avx2>(), filed::<avx::Avx2>()),
             #[cfg(target_arch = "x86_64")]
-            "AVX-512" => answers::<avx::Avx512>(),
+            "AVX-512" => (answers::<avx512::Avx512>(), filed::<avx512::Avx512>()),
             _ => continue,
         };
         assert!(said == plain, "{}", kernel.name());
+        assert!(lists == filed::<Portable>(), "{}", kernel.name());
     }
     assert!(
         plain.contains(&(WIDTH as u32)),
         "some ray enters all children"
     );
+}
+
+/// Where a kernel files many rays.
+fn filed<L: Lanes>() -> Vec<Vec<u32>> {
+    const ROOM: usize = 4 * FILED;
+    let mut said = Vec::new();
+    for count in 0..=3 * FILED as u32 {
+        let slots: [u32; ROOM] = std::array::from_fn(|i| 100 + i as u32);
+        let current = |i: usize| match random::bits(10, 100 * count + i as u32) % 5 {
+            0 => DONE,
+            1 => OTHER | i as u32,
+            2 => LEAF | 3 << 28 | i as u32,
+            3 => LEAF | i as u32,
+            _ => i as u32,
+        };
+        let currents: [u32; ROOM] = std::array::from_fn(current);
+        let mut lists = [[0_u32; 2 * ROOM]; 3];
+        let starts = lists.each_mut().map(|list| list.as_mut_ptr());
+        let [nodes, leaves, rest] = starts;
+        let mut ends = Ends {
+            nodes,
+            leaves,
+            rest,
+        };
+        // SAFETY: the caller has what the kernel needs; there is room for all in each list and sixteen more.
+        let lengths = unsafe {
+            L::file(slots.as_ptr(), currents.as_ptr(), count as usize, &mut ends);
+            [
+                ends.nodes.offset_from(nodes),
+                ends.leaves.offset_from(leaves),
+                ends.rest.offset_from(rest),
+            ]
+        };
+        assert_eq!(lengths.iter().sum::<isize>(), count as isize);
+        said.extend((lists.iter().zip(lengths)).map(|(list, n)| list[..n as usize].to_vec()));
+    }
+    said
 }
 
 /// Items without triangles: only their boxes count.
