@@ -5,15 +5,20 @@
 //! Items that are no triangles (spheres, instances) stand in the same tree as leaves of their own, and
 //! are met by whoever asked for the walk.
 
+mod assembly;
 #[cfg(target_arch = "x86_64")]
 mod avx;
 mod batch;
+mod binary;
 mod build;
+mod chunks;
 mod collapse;
 mod compiled;
+mod crown;
 mod kernel;
 mod node;
 mod portable;
+mod sketch;
 mod state;
 
 use glam::Vec3;
@@ -69,10 +74,10 @@ impl Tree {
     /// A tree over items with these boxes, which are finite and not empty; and the items that are no
     /// triangles, in the order in which the walker is asked for them.
     pub(super) fn build(boxes: &[Bounds], leaves: &impl Leaves, work: Build) -> (Self, Vec<u32>) {
-        match build::binary(boxes, work) {
-            Some(binary) => collapse::collapse(&binary, leaves),
-            None => Default::default(),
+        if boxes.is_empty() {
+            return Default::default();
         }
+        build::build(boxes, leaves, work)
     }
 
     /// Nodes on the longest way down.
@@ -135,5 +140,7 @@ impl Tree {
 /// Trees up to this size are in the caches nearest to a core, as far as counts.
 const CACHED: usize = 16 << 20;
 
+#[cfg(test)]
+mod build_tests;
 #[cfg(test)]
 mod tests;
