@@ -359,7 +359,7 @@ impl Series<'_> {
         {
             return Ok((options, description));
         }
-        let mut description = scene.describe(&item.input, &options)?;
+        let mut description = scene.describe(&item.input, &options, &mut self.session)?;
         self.arguments.overrides().apply(&mut description);
         Ok((options, description))
     }

@@ -31,7 +31,7 @@ use crate::image::{Image, Metadata, Window};
 use crate::integrator::Stats;
 
 pub use adaptive::AdaptiveReport;
-pub use bare::{UpAxis, describe_mesh, is_mesh};
+pub use bare::{BareMesh, UpAxis, describe_mesh, is_mesh};
 pub use check::check;
 pub use info::{NamedFile, SceneInfo, SensorInfo};
 pub use memory::human_bytes;
