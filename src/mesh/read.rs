@@ -155,7 +155,7 @@ pub(super) struct Input<'a> {
     pub(super) path: &'a Path,
     /// Bytes that `reader` will give.
     pub(super) length: u64,
-    pub(super) reader: &'a mut dyn Read,
+    pub(super) reader: &'a mut (dyn Read + Send),
 }
 
 impl Input<'_> {

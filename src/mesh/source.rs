@@ -17,7 +17,7 @@ const LONGEST_WORD: usize = 1 << 10;
 
 pub(super) struct Source<'a> {
     path: &'a Path,
-    reader: &'a mut dyn Read,
+    reader: &'a mut (dyn Read + Send),
     /// Bytes that `reader` has yet to give.
     ahead: u64,
     buffer: Vec<u8>,
