@@ -1,26 +1,23 @@
 //! Building a tree: the items are cut into chunks, and each chunk is clustered and planned by itself, on one thread
 //! and in little memory. What is kept of it is 16 bytes an item and its [crown](super::crown); once the crowns have been
-//! joined it is known as how many children each of their subtrees is wanted, and the nodes are made. Nothing of this
-//! depends on the number of threads.
-
-use std::sync::{Mutex, PoisonError};
+//! joined it is known as how many children each of their subtrees is wanted, and the sketches are drawn. Nothing of
+//! this depends on the number of threads.
 
 use obvhs::bvh2::node::Bvh2Node;
 use obvhs::ploc::PlocBuilder;
 use rayon::prelude::*;
 
-use super::assembly::Assembly;
+use super::Leaves;
+use super::assembly::Sketches;
 use super::binary::binary;
 use super::chunks::{Chunks, chunks, most};
 use super::collapse::{Collapse, Plan};
 use super::crown::{Crown, Top, top};
-use super::sketch::Sketch;
-use super::{Leaves, Tree};
 use crate::accel::Build;
 use crate::shape::Bounds;
 
-/// The tree over at least one item, and the items that are no triangles, in the order of their names.
-pub(super) fn build(boxes: &[Bounds], leaves: &impl Leaves, work: Build) -> (Tree, Vec<u32>) {
+/// The tree over at least one item, without its boxes.
+pub(super) fn build(boxes: &[Bounds], leaves: &impl Leaves, work: Build) -> Sketches {
     build_in(most(boxes.len()), boxes, leaves, work)
 }
 
@@ -30,7 +27,7 @@ pub(super) fn build_in(
     boxes: &[Bounds],
     leaves: &impl Leaves,
     work: Build,
-) -> (Tree, Vec<u32>) {
+) -> Sketches {
     let Chunks { cuts, items } = chunks(boxes, most);
     let several = items.len() > 1;
     let planned = items
@@ -51,27 +48,8 @@ pub(super) fn build_in(
         }
         None => collapse.sketch(),
     });
-    let sketches: Vec<Sketch> = drawn.collect();
-    assemble(boxes, leaves, sketches, top.map(|top| top.sketch))
-}
-
-/// Makes the nodes and blocks of sketches, and joins them under `top`, if there is more than one.
-pub(super) fn assemble(
-    boxes: &[Bounds],
-    leaves: &impl Leaves,
-    sketches: Vec<Sketch>,
-    top: Option<Sketch>,
-) -> (Tree, Vec<u32>) {
-    let assembly = Mutex::new(Assembly::new(sketches.len()));
-    // One after another, whichever thread is free: so few parts wait for those before them.
-    let sketches = sketches.into_iter().enumerate().par_bridge();
-    sketches.for_each(|(place, sketch)| {
-        let part = sketch.part(boxes, leaves);
-        let mut assembly = assembly.lock().unwrap_or_else(PoisonError::into_inner);
-        assembly.take(place, part);
-    });
-    let assembly = assembly.into_inner();
-    assembly
-        .unwrap_or_else(PoisonError::into_inner)
-        .finish(top.as_ref())
+    Sketches {
+        parts: drawn.collect(),
+        top: top.map(|top| top.sketch),
+    }
 }

@@ -10,15 +10,20 @@ struct Triangles(mesh::Mesh);
 
 impl Triangles {
     fn boxes(&self) -> Vec<Bounds> {
-        let triangles = 0..self.0.triangles.len() as u32;
-        let corners = triangles.map(|item| self.triangle(item).1);
-        corners
-            .map(|c| c.into_iter().fold(Bounds::EMPTY, Bounds::with))
-            .collect()
+        (0..self.count()).map(|item| self.bounds(item)).collect()
     }
 }
 
 impl Leaves for Triangles {
+    fn count(&self) -> u32 {
+        self.0.triangles.len() as u32
+    }
+
+    fn bounds(&self, item: u32) -> Bounds {
+        let (_, corners) = self.triangle(item);
+        corners.into_iter().fold(Bounds::EMPTY, Bounds::with)
+    }
+
     fn is_triangle(&self, _: u32) -> bool {
         true
     }
@@ -83,8 +88,8 @@ fn a_tree_in_chunks_costs_no_more_than_one_tree() {
         let boxes = leaves.boxes();
         for work in [Build::Fast, Build::Medium] {
             let [one, chunked] = [usize::MAX, 4096].map(|most| {
-                let (tree, _) = build::build_in(most, &boxes, &leaves, work);
-                cost(&tree)
+                let sketches = build::build_in(most, &boxes, &leaves, work);
+                cost(&sketches.tree(&boxes, &leaves).0)
             });
             assert!(
                 chunked < 1.01 * one,
@@ -97,14 +102,10 @@ fn a_tree_in_chunks_costs_no_more_than_one_tree() {
 #[test]
 fn a_tree_is_the_same_whatever_the_threads() {
     let leaves = Triangles(mesh::hair(60_000, 1));
-    let boxes = leaves.boxes();
     let trees = [1, 2, 5].map(|threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
-        let (tree, _) = pool
-            .build()
-            .unwrap()
-            .install(|| Tree::build(&boxes, &leaves, Build::Fast));
-        bits(&tree)
+        let build = || bits(&Tree::build(&leaves, Build::Fast, None).0);
+        pool.build().unwrap().install(build)
     });
     assert!(trees[0] == trees[1] && trees[1] == trees[2]);
 }
@@ -118,16 +119,13 @@ fn every_triangle_stands_in_one_chunk_and_one_block() {
     let leaves = Triangles(mesh);
     let boxes = leaves.boxes();
     let chunks = chunks::chunks(&boxes, 1000);
-    assert!(
-        chunks
-            .items
-            .iter()
-            .all(|items| (1..=1000).contains(&items.len()))
-    );
+    let sizes = chunks.items.iter().map(Vec::len);
+    assert!(sizes.min() > Some(0) && chunks.items.iter().all(|items| items.len() <= 1000));
     let mut items = chunks.items.concat();
     items.sort_unstable();
     assert!(items.into_iter().eq(0..boxes.len() as u32));
-    let (tree, _) = build::build_in(1000, &boxes, &leaves, Build::Fast);
+    let sketches = build::build_in(1000, &boxes, &leaves, Build::Fast);
+    let (tree, _) = sketches.tree(&boxes, &leaves);
     let ids = tree.blocks.iter().flat_map(|block| block.ids);
     let mut ids: Vec<u32> = ids.filter(|id| *id != u32::MAX).collect();
     ids.sort_unstable();
