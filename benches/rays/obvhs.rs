@@ -1,5 +1,5 @@
 //! obvhs's own traversal as it comes: its compressed wide tree `CwBvh` and its binary tree `Bvh2` over its
-//! `RtTriangle`s, built with its medium settings.
+//! `RtTriangle`s, built with its medium settings. It is here without its feature `parallel`: its builds take one thread.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};

@@ -11,13 +11,15 @@ mod triangle;
 mod walk;
 mod wide;
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
+use crate::error::{Error, Problem};
 use crate::interaction::{Hit, Interaction, Ray};
 use crate::math::Transform;
 use crate::shape::{Bounds, Geometry};
 
-use group::{Group, Item, Shapes};
+use group::{Group, Members, Shapes};
 use walk::Walk;
 
 pub use wide::Kernel;
@@ -50,7 +52,7 @@ pub enum Method {
 }
 
 /// How much work goes into a tree. More makes rays faster and changes no hit.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Build {
     /// Clusters are looked for near by.
     Fast,
@@ -79,12 +81,38 @@ const MEDIUM_PAYS: u64 = 150;
 const SLOW_PAYS: u64 = 800;
 
 /// How a tracer is made.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Recipe {
     /// Tree or brute force.
     pub method: Method,
     /// The work that goes into a tree.
     pub build: Build,
+    /// A folder in which trees are kept: what was built once is read from there. It is made where it is not there.
+    pub cache: Option<PathBuf>,
+}
+
+/// What a folder of trees was good for.
+#[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize)]
+pub struct CacheUse {
+    /// Trees that were read.
+    pub read: usize,
+    /// Trees that were built and written.
+    pub written: usize,
+    /// Files that could not be used or written; their trees were built all the same.
+    #[serde(skip)]
+    pub problems: Vec<Problem>,
+}
+
+impl CacheUse {
+    fn warn(&mut self, error: Error) {
+        self.problems.extend_from_slice(error.problems());
+    }
+
+    fn add(&mut self, other: Self) {
+        self.read += other.read;
+        self.written += other.written;
+        self.problems.extend(other.problems);
+    }
 }
 
 impl From<Method> for Recipe {
@@ -115,6 +143,7 @@ pub struct Tracer {
     groups: Vec<Group>,
     method: Method,
     kernel: Kernel,
+    cache: CacheUse,
 }
 
 impl Tracer {
@@ -134,20 +163,18 @@ impl Tracer {
             .max()
             .unwrap_or(0);
         let shapes = Shapes::new(shapes);
-        let members = |group: u32| {
-            let shapes = shapes
-                .iter()
-                .zip(group_of)
-                .enumerate()
-                .filter(move |(_, (_, g))| **g == group);
-            shapes.flat_map(|(i, (shape, _))| {
-                (0..shape.primitive_count())
-                    .map(move |p| (Item::primitive(i as u32, p), shape.bounds(p)))
-            })
+        let mut shapes_of = vec![Vec::new(); count as usize];
+        for (shape, group) in (0..).zip(group_of) {
+            shapes_of[*group as usize].push(shape);
+        }
+        let mut cache = CacheUse::default();
+        let mut group = |of: &[u32], instances: &[Bounds]| {
+            let (group, used) = Group::new(Members::new(&shapes, of, instances), &recipe);
+            cache.add(used);
+            group
         };
-        let mut groups: Vec<Group> = (1..count)
-            .map(|g| Group::new(members(g), recipe, &shapes))
-            .collect();
+        let groups = shapes_of[1..].iter().map(|of| group(of, &[]));
+        let mut groups: Vec<Group> = groups.collect();
         let instance_bounds: Vec<Bounds> = (instances.iter())
             .map(|instance| {
                 let group = &groups[instance.group as usize - 1];
@@ -158,10 +185,7 @@ impl Tracer {
                 }
             })
             .collect();
-        let placed = (0..)
-            .map(Item::instance)
-            .zip(instance_bounds.iter().copied());
-        let world = Group::new(members(0).chain(placed), recipe, &shapes);
+        let world = group(&shapes_of[0], &instance_bounds);
         groups.insert(0, world);
         Self {
             shapes,
@@ -170,6 +194,7 @@ impl Tracer {
             groups,
             method: recipe.method,
             kernel: Kernel::best(),
+            cache,
         }
     }
 
@@ -212,15 +237,17 @@ impl Tracer {
 
     /// Primitives, each instance's counted once.
     pub fn primitive_count(&self) -> usize {
-        self.shapes
-            .iter()
-            .map(|s| s.primitive_count() as usize)
-            .sum()
+        self.shapes.primitive_count()
     }
 
     /// How many instances there are.
     pub fn instance_count(&self) -> usize {
         self.instances.len()
+    }
+
+    /// What the folder of trees was good for, if there was one.
+    pub fn cache_use(&self) -> &CacheUse {
+        &self.cache
     }
 
     /// Bytes held by trees.

@@ -42,7 +42,11 @@ fn rays(count: u32, targets: &[Vec3]) -> Vec<Ray> {
 /// Brute force, and the tree walked by every kernel.
 fn all(shapes: &[Arc<Geometry>], groups: &[u32], instances: &[Instance]) -> Vec<Tracer> {
     let tracer = |method, build| {
-        let recipe = Recipe { method, build };
+        let recipe = Recipe {
+            method,
+            build,
+            cache: None,
+        };
         Tracer::new(shapes.to_vec(), groups, instances.to_vec(), recipe)
     };
     let walked = Kernel::all().into_iter();
@@ -116,7 +120,16 @@ fn the_work_on_a_tree_changes_no_hit() {
     let shapes = [Arc::new(Geometry::Mesh(TriangleMesh::new(mesh)))];
     let found = [Build::Fast, Build::Medium, Build::Slow].map(|build| {
         let method = Method::Tree;
-        let tracer = Tracer::new(shapes.to_vec(), &[0], Vec::new(), Recipe { method, build });
+        let tracer = Tracer::new(
+            shapes.to_vec(),
+            &[0],
+            Vec::new(),
+            Recipe {
+                method,
+                build,
+                cache: None,
+            },
+        );
         let (mut hits, mut counts) = (Vec::new(), Counts::default());
         tracer.closest(&rays, &mut hits, &mut counts);
         (hits, counts.node_steps)

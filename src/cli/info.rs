@@ -71,8 +71,9 @@ fn info(arguments: &Arguments, input: &Path) -> Result<Value> {
 
 fn scene(arguments: &Arguments, input: &Path) -> Result<Value> {
     let scene = &arguments.scene;
-    let description = scene.describe(input, &scene.options(None))?;
-    let info = Session::default().info(&description, &Options::default(), &Silent)?;
+    let mut session = Session::default();
+    let description = scene.describe(input, &scene.options(None), &mut session)?;
+    let info = session.info(&description, &Options::default(), &Silent)?;
     if !arguments.quiet {
         report::warnings(&info.warnings);
     }

@@ -117,6 +117,10 @@ pub(super) struct Arguments {
     /// triangles and the rays to be expected. The image is the same
     #[arg(long, value_enum, value_name = "WORK", help_heading = RUN)]
     build: Option<Work>,
+    /// Keep trees in this folder, and read from there what was built before for the same triangles. Each is
+    /// checked; the image is the same
+    #[arg(long, value_name = "DIR", help_heading = RUN)]
+    cache: Option<PathBuf>,
 
     /// No progress bar, no summary, no warnings
     #[arg(short, long, help_heading = TELL)]
@@ -144,7 +148,8 @@ Examples:
   etendue render dragon.ply -o out/{frame:03}.png --turntable 36
   etendue render walk.xml -o out/{frame:04}.exr --frames 0:240 -D body=body-{frame:04}.ply
   etendue render room.xml -o room.exr --noise-threshold 0.01 --sampler sobol
-  etendue render big.xml -o big.exr --checkpoint 300 --resume";
+  etendue render big.xml -o big.exr --checkpoint 300 --resume
+  etendue render terrain.ply -o terrain.png --cache ~/.cache/etendue";
 
 /// How rays find shapes.
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -192,6 +197,7 @@ impl Arguments {
                 Work::Medium => Build::Medium,
                 Work::Slow => Build::Slow,
             }),
+            cache: self.cache.clone(),
             sensor: item.sensor,
             checkpoint: (self.checkpoint.is_some() || self.resume).then_some(checkpoint),
             memory_limit,
@@ -359,7 +365,7 @@ impl Series<'_> {
         {
             return Ok((options, description));
         }
-        let mut description = scene.describe(&item.input, &options)?;
+        let mut description = scene.describe(&item.input, &options, &mut self.session)?;
         self.arguments.overrides().apply(&mut description);
         Ok((options, description))
     }

@@ -136,7 +136,11 @@ fn stats(report: &Report) {
     let rate = rays / report.seconds.render.max(1e-9) * 1e-6;
     let megabytes = |bytes: usize| bytes as f64 * 1e-6;
     let [geometry, trees] = report.bytes.map(megabytes);
-    for (name, value) in [
+    let kept = report.cache.as_ref().map(|cache| {
+        let value = format!("{} read, {} written", cache.read, cache.written);
+        ("trees kept", value)
+    });
+    let rows = [
         ("primitives", report.primitives.to_string()),
         ("lights", report.lights.to_string()),
         (
@@ -161,7 +165,8 @@ fn stats(report: &Report) {
             "seconds to render",
             format!("{:.3} ({rate:.2} M rays/s)", report.seconds.render),
         ),
-    ] {
+    ];
+    for (name, value) in rows.into_iter().chain(kept) {
         output::line(&format!("  {name:22} {value}"));
     }
 }

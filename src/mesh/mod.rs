@@ -27,7 +27,7 @@ use rayon::prelude::*;
 pub use generate::{bumpy_sphere, cube, grid, hair, rectangle, sphere, terrain};
 pub use gltf::{GltfCamera, GltfPart, GltfScene, Projection, read_gltf};
 pub use mtl::BARE_COLOR;
-pub use read::{FORMATS, Format, Loaded, ReadOptions, read};
+pub use read::{FORMATS, Format, Loaded, MeshFile, ReadMesh, ReadOptions, read};
 
 /// Triangles over shared vertices.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -166,6 +166,17 @@ impl Mesh {
             + self.uvs.capacity() * size_of::<Vec2>()
             + self.triangles.capacity() * size_of::<[u32; 3]>()
             + attributes.sum::<usize>()
+    }
+
+    /// Gives back memory that the arrays do not need.
+    pub(crate) fn shrink(&mut self) {
+        self.positions.shrink_to_fit();
+        self.normals.shrink_to_fit();
+        self.uvs.shrink_to_fit();
+        self.triangles.shrink_to_fit();
+        for attribute in &mut self.attributes {
+            attribute.values.shrink_to_fit();
+        }
     }
 
     /// Drops triangles with a corner that is not finite, and mends normals and texture coordinates that are
@@ -308,12 +319,10 @@ impl Mesh {
     }
 
     fn mend_uvs(&mut self) -> usize {
-        let mut count = 0;
-        for uv in self.uvs.iter_mut().filter(|uv| !uv.is_finite()) {
-            *uv = Vec2::ZERO;
-            count += 1;
-        }
-        count
+        (self.uvs.par_iter_mut().with_min_len(GRAIN))
+            .filter(|uv| !uv.is_finite())
+            .map(|uv| *uv = Vec2::ZERO)
+            .count()
     }
 
     /// Turns texture coordinates over, `v` → `1 − v`.

@@ -3,13 +3,13 @@
 
 use std::fs::File;
 use std::io::Read;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::{Mesh, Repairs, gltf, obj, ply, serialized, stl};
 use crate::error::{Error, Location, Problem, Result};
 
 /// How to read a mesh file; the default is what Mitsuba does without properties.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct ReadOptions {
     /// Whether `v` of a texture coordinate becomes `1 − v`; `None` stands for the format's habit: true
     /// for OBJ, false for all others.
@@ -30,6 +30,24 @@ pub struct Loaded {
     pub dropped_triangles: usize,
     /// What was odd in the file and did not prevent reading it.
     pub warnings: Vec<Problem>,
+}
+
+/// A file, and how it is read: those who agree in both can share a mesh.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct MeshFile {
+    /// Where it is.
+    pub path: PathBuf,
+    /// How it is read.
+    pub options: ReadOptions,
+}
+
+/// A mesh with the file that it comes from.
+#[derive(Clone, Debug)]
+pub struct ReadMesh {
+    /// The file.
+    pub file: MeshFile,
+    /// What is in it.
+    pub loaded: Loaded,
 }
 
 /// A mesh file format.
@@ -137,7 +155,7 @@ pub(super) struct Input<'a> {
     pub(super) path: &'a Path,
     /// Bytes that `reader` will give.
     pub(super) length: u64,
-    pub(super) reader: &'a mut dyn Read,
+    pub(super) reader: &'a mut (dyn Read + Send),
 }
 
 impl Input<'_> {
@@ -185,6 +203,7 @@ impl Decoded {
                 self.warnings.push(format!("{count} {what}"));
             }
         }
+        self.mesh.shrink();
         if self.mesh.triangles.is_empty() {
             self.warnings.push("the mesh has no triangles".to_owned());
         }

@@ -25,13 +25,14 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
+use crate::accel::CacheUse;
 use crate::description::Description;
 use crate::error::{Problem, Result};
 use crate::image::{Image, Metadata, Window};
 use crate::integrator::Stats;
 
 pub use adaptive::AdaptiveReport;
-pub use bare::{UpAxis, describe_mesh, is_mesh};
+pub use bare::{BareMesh, UpAxis, describe_mesh, is_mesh};
 pub use check::check;
 pub use info::{NamedFile, SceneInfo, SensorInfo};
 pub use memory::human_bytes;
@@ -77,6 +78,9 @@ pub struct Report {
     pub lights: usize,
     /// Bytes of geometry and of trees.
     pub bytes: [usize; 2],
+    /// What the folder of trees was good for, if there is one and the scene was not in memory.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cache: Option<CacheUse>,
     /// Rays, steps and tests.
     pub stats: Stats,
     /// Samples that were not finite and were dropped.

@@ -58,6 +58,8 @@ pub struct Options {
     pub method: Method,
     /// How much work goes into the tree; what suits the scene and the rays where absent.
     pub build: Option<Build>,
+    /// A folder in which trees are kept from one run to the next.
+    pub cache: Option<PathBuf>,
     /// Which of the scene's sensors, in file order from 0.
     pub sensor: usize,
     /// Where the render is kept, so that it can be continued after an interruption.

@@ -11,12 +11,13 @@ use super::options::{Colors, Options};
 use super::plan::Completed;
 use super::progress::{Phase, Progress};
 use super::{Report, Seconds, timed};
-use crate::accel::{Build, Method, Recipe};
+use crate::accel::{Build, CacheUse, Method, Recipe};
 use crate::color::ColorModel;
 use crate::description::{Description, Kind, NodeId, Properties};
 use crate::error::{Error, Problem, Problems, Result};
 use crate::image::{Metadata, Window};
 use crate::integrator::{self, Estimator, Integrator};
+use crate::mesh::ReadMesh;
 use crate::sampler::Sampler;
 use crate::scene::{self, Assets, Scene};
 use crate::sensor::{Film, Sensor};
@@ -31,6 +32,23 @@ pub(super) struct Kept {
     facts: Facts,
     /// The time that it took, until a render has told it.
     pub(super) spent: Seconds,
+}
+
+/// What is in memory from one render to the next.
+#[derive(Debug, Default)]
+pub(super) struct Shelf {
+    /// The last scene.
+    pub(super) kept: Option<Kept>,
+    /// A mesh of the next scene.
+    pub(super) given: Option<ReadMesh>,
+}
+
+impl Kept {
+    /// What it took has been told.
+    pub(super) fn told(&mut self) {
+        self.spent = Seconds::default();
+        self.facts.cache = None;
+    }
 }
 
 /// What two renders must agree in to share a scene.
@@ -51,6 +69,8 @@ pub(super) struct Facts {
     /// Bytes of geometry and of trees.
     pub(super) bytes: [usize; 2],
     pub(super) warnings: Vec<Problem>,
+    /// What the folder of trees was good for, until a render has told it.
+    pub(super) cache: Option<CacheUse>,
     /// The hash of the scene's files, once it was asked for.
     contents: OnceLock<String>,
 }
@@ -146,11 +166,15 @@ pub(super) fn view<C: ColorModel>(description: &Description, sensor: NodeId) -> 
     })
 }
 
-/// Loads the shapes.
-pub(super) fn load(description: &Description, progress: &dyn Progress) -> Result<Assets> {
+/// Loads the shapes but for the mesh that is `given`.
+pub(super) fn load(
+    description: &Description,
+    given: Option<ReadMesh>,
+    progress: &dyn Progress,
+) -> Result<Assets> {
     let shapes = description.root().children(Kind::Shape).len();
     progress.begin(Phase::Load, shapes as u64);
-    Assets::load(description, &|| progress.advance(1, 0))
+    Assets::load(description, given, &|| progress.advance(1, 0))
 }
 
 /// What the view says of the work to come.
@@ -160,6 +184,12 @@ struct Share {
     film: u64,
     /// How many rays are to be expected.
     rays: u64,
+}
+
+/// What a scene is made from.
+struct Source<'a> {
+    description: &'a Description,
+    given: Option<ReadMesh>,
 }
 
 /// How many rays a film of so many samples a pixel takes, as a rule: paths of three bounces that each ask
@@ -172,7 +202,7 @@ fn rays(film: &Film, samples: u32) -> u64 {
 
 /// Loads the shapes and builds the scene, having made sure that there is room for it.
 fn make<C: ColorModel>(
-    description: &Description,
+    Source { description, given }: Source<'_>,
     options: &Options,
     color: C,
     Share { film, rays }: Share,
@@ -184,13 +214,14 @@ fn make<C: ColorModel>(
         ..Estimate::of_files(description)
     };
     announced.check(options.memory_limit)?;
-    let assets = timed(&mut seconds.load, || load(description, progress)).map_err(|error| {
-        // What is wrong with materials is told along with what is wrong with shapes.
-        let mut problems = Problems::default();
-        problems.push(error);
-        problems.take(scene::check_materials(description, color.clone()));
-        problems.finish().expect_err("shapes have problems")
-    })?;
+    let assets =
+        timed(&mut seconds.load, || load(description, given, progress)).map_err(|error| {
+            // What is wrong with materials is told along with what is wrong with shapes.
+            let mut problems = Problems::default();
+            problems.push(error);
+            problems.take(scene::check_materials(description, color.clone()));
+            problems.finish().expect_err("shapes have problems")
+        })?;
     let primitives = assets.primitive_count();
     let loaded = Estimate {
         film,
@@ -207,29 +238,35 @@ fn make<C: ColorModel>(
         let recipe = Recipe {
             method: options.method,
             build,
+            cache: options.cache.clone(),
         };
         scene::build(description, &assets, color, recipe)
     })?;
     progress.advance(1, 0);
+    let cache = scene.tracer().cache_use().clone();
+    let warnings = assets.warnings().iter().chain(&cache.problems);
     let facts = Facts {
         primitives,
         instances: scene.tracer().instance_count(),
         bounds: scene.tracer().bounds(),
         bytes: [assets.bytes(), scene.tracer().tree_bytes()],
-        warnings: assets.warnings().to_vec(),
+        warnings: warnings.cloned().collect(),
+        cache: options.cache.as_ref().map(|_| cache),
         contents: OnceLock::new(),
     };
     Ok((scene, facts, seconds))
 }
 
-/// Builds the job; `kept` is its scene where the description's is equal, else it makes room for the new one.
+/// Builds the job; what is kept is its scene where the description's is equal, else it makes room for the new one.
 pub(super) fn prepare<'k, C: ColorModel>(
-    kept: &'k mut Option<Kept>,
+    shelf: &'k mut Shelf,
     description: &Description,
     options: &Options,
     color: C,
     progress: &dyn Progress,
 ) -> Result<Job<'k, C>> {
+    let Shelf { kept, given } = shelf;
+    let given = given.take();
     let mut problems = Problems::default();
     let key = Key {
         scene: fingerprint::scene_key(description),
@@ -256,7 +293,8 @@ pub(super) fn prepare<'k, C: ColorModel>(
         }
     } else {
         *kept = None;
-        let made = make(description, options, color, share, progress);
+        let source = Source { description, given };
+        let made = make(source, options, color, share, progress);
         *kept = problems.take(made).map(|(scene, facts, spent)| Kept {
             key,
             scene: Box::new(scene),
@@ -360,6 +398,7 @@ impl<C: ColorModel> Job<'_, C> {
             primitives: self.facts.primitives,
             lights: self.scene.light_count(),
             bytes: self.facts.bytes,
+            cache: self.facts.cache.clone(),
             stats: Default::default(),
             dropped_samples: 0,
             dropped_pixel: None,

@@ -4,31 +4,33 @@
 //! of rays that enter it, times what entering costs.
 
 use obvhs::bvh2::node::Bvh2Node;
-use rayon::prelude::*;
 
-use super::build::Binary;
-use super::node::{BLOCK, BLOCK_INDEX, Block, LEAF, Node, OTHER, OTHER_INDEX, WIDTH};
-use super::{Leaves, Tree};
-use crate::shape::Bounds;
+use super::node::{BLOCK, WIDTH};
+use super::sketch::{INNER, Sketch, Stroke};
 
 /// What entering a block costs, where entering a node costs 1. Anything from 0.5 to 1 is as good.
 const BLOCK_COST: f32 = 0.8;
-/// Subtrees of fewer binary nodes are done by one thread.
-const GRAIN: usize = 1 << 14;
 
 /// What a binary subtree costs.
 #[derive(Clone, Copy, Debug, Default)]
-struct Plan {
+pub(super) struct Plan {
     /// As at most 1, 2, … 7 children.
     cost: [f32; WIDTH - 1],
     items: u32,
-    /// Whether it becomes a leaf.
-    leaf: bool,
-    /// Whether some item is no triangle.
-    mixed: bool,
+    /// Whether it becomes one leaf.
+    pub(super) leaf: bool,
+    /// Whether it must not share a block with others.
+    pub(super) alone: bool,
+}
+
+/// Half the area of a node's box: infinite where a product of its sides overflows, be others zero.
+pub(super) fn area(node: &Bvh2Node) -> f32 {
+    let area = node.aabb().half_area();
+    if area.is_nan() { f32::INFINITY } else { area }
 }
 
 /// The way to share `slots` children between two nodes, and its cost: how many the first gets.
+#[inline(always)]
 fn share(first: &Plan, second: &Plan, slots: usize) -> (usize, f32) {
     let mut best = (1, f32::INFINITY);
     for k in slots.saturating_sub(WIDTH - 1).max(1)..slots.min(WIDTH) {
@@ -40,254 +42,265 @@ fn share(first: &Plan, second: &Plan, slots: usize) -> (usize, f32) {
     best
 }
 
-/// Half the area of a node's box: infinite where a product of its sides overflows, be others zero.
-fn area(node: &Bvh2Node) -> f32 {
-    let area = node.aabb().half_area();
-    if area.is_nan() { f32::INFINITY } else { area }
-}
-
-struct Collapse<'b, L> {
-    nodes: &'b [Bvh2Node],
-    plans: Vec<Plan>,
-    leaves: &'b L,
-}
-
-/// A wide tree in the making; the root comes first.
-#[derive(Default)]
-struct Part {
-    nodes: Vec<Node>,
-    blocks: Vec<Block>,
-    others: Vec<u32>,
-    levels: usize,
-    /// Subtrees left to others: the wide node that they become, the binary node, and the level.
-    deferred: Vec<(usize, usize, usize)>,
-}
-
-/// The wide tree over a binary one, and its items that are no triangles in the order of their names.
-pub(super) fn collapse(binary: &Binary, leaves: &impl Leaves) -> (Tree, Vec<u32>) {
-    let nodes = &binary.nodes;
-    let mut collapse = Collapse {
-        nodes,
-        plans: Vec::new(),
-        leaves,
-    };
-    let mut plans = vec![Plan::default(); nodes.len()];
-    let (root, below) = plans.split_at_mut(1);
-    collapse.plan_below(0, nodes.len(), below);
-    root[0] = collapse.plan(0, below, 1);
-    collapse.plans = plans;
-    let top = collapse.part(0, GRAIN);
-    let parts: Vec<Part> = (top.deferred.par_iter())
-        .map(|(_, node, _)| collapse.part(*node, 0))
-        .collect();
-    top.joined(parts)
-}
-
-impl<L: Leaves> Collapse<'_, L> {
-    /// Plans everything below a node; `end` is where the binary nodes below it end, `plans` begins at its
-    /// children.
-    fn plan_below(&self, node: usize, end: usize, plans: &mut [Plan]) {
-        let node = &self.nodes[node];
-        if node.is_leaf() {
-            return;
+impl Plan {
+    /// The plan for an item.
+    pub(super) fn item(node: &Bvh2Node, alone: bool) -> Self {
+        Self {
+            cost: [area(node) * BLOCK_COST; WIDTH - 1],
+            items: 1,
+            leaf: true,
+            alone,
         }
-        let first = node.first_index as usize;
-        if end - first < GRAIN {
-            for i in (first..end).rev() {
-                plans[i - first] = self.plan(i, plans, first);
-            }
-            return;
-        }
-        // Below the second child comes first.
-        let middle = match &self.nodes[first] {
-            leaf if leaf.is_leaf() => end,
-            inner => inner.first_index as usize,
-        };
-        let (pair, below) = plans.split_at_mut(2);
-        let (second, other) = below.split_at_mut(middle - first - 2);
-        rayon::join(
-            || self.plan_below(first + 1, middle, second),
-            || self.plan_below(first, end, other),
-        );
-        pair[1] = self.plan(first + 1, second, first + 2);
-        pair[0] = self.plan(first, other, middle);
     }
 
-    /// Plans a node whose children are planned; `plans` begins at the binary node `base`.
-    fn plan(&self, node: usize, plans: &[Plan], base: usize) -> Plan {
-        let node = &self.nodes[node];
-        let area = area(node);
-        if node.is_leaf() {
-            return Plan {
-                cost: [area * BLOCK_COST; WIDTH - 1],
-                items: 1,
-                leaf: true,
-                mixed: !self.leaves.is_triangle(node.first_index),
-            };
-        }
-        let child = node.first_index as usize - base;
-        let [first, second] = [&plans[child], &plans[child + 1]];
-        let items = first.items + second.items;
-        let mixed = first.mixed || second.mixed;
-        let as_leaf = if items as usize <= BLOCK && !mixed {
+    /// The plan for a node over two others, and how it shares its children out.
+    fn over(area: f32, first: &Plan, second: &Plan) -> (Self, [usize; WIDTH + 1]) {
+        let items = first.items.saturating_add(second.items);
+        let alone = first.alone || second.alone;
+        let is_small = items as usize <= BLOCK && !alone;
+        let as_leaf = if is_small {
             area * BLOCK_COST
         } else {
             f32::INFINITY
         };
-        let as_node = share(first, second, WIDTH).1 + area;
+        let mut shares = [0; WIDTH + 1];
+        let (k, below) = share(first, second, WIDTH);
+        shares[WIDTH] = k;
+        let as_node = below + area;
         let mut cost = [as_leaf.min(as_node); WIDTH - 1];
         for slots in 2..WIDTH {
-            cost[slots - 1] = share(first, second, slots).1.min(cost[slots - 2]);
+            let (k, split) = share(first, second, slots);
+            cost[slots - 1] = split.min(cost[slots - 2]);
+            shares[slots] = if split < cost[slots - 2] { k } else { 0 };
         }
-        Plan {
+        let plan = Self {
             cost,
             items,
             // The infinity of areas that overflow is a reason too.
-            leaf: as_leaf <= as_node && items as usize <= BLOCK && !mixed,
-            mixed,
-        }
-    }
-
-    /// The binary nodes that become the children of the wide node over `node`.
-    fn children(&self, node: usize) -> Vec<usize> {
-        let pair = |node: usize| self.nodes[node].first_index as usize;
-        let mut children = Vec::with_capacity(WIDTH);
-        if self.plans[node].leaf {
-            return vec![node];
-        }
-        let mut open = vec![(node, WIDTH)];
-        while let Some((node, mut slots)) = open.pop() {
-            let plan = &self.plans[node];
-            while (2..WIDTH).contains(&slots) && plan.cost[slots - 1] >= plan.cost[slots - 2] {
-                slots -= 1;
-            }
-            if slots == 1 {
-                children.push(node);
-                continue;
-            }
-            let first = pair(node);
-            let (k, _) = share(&self.plans[first], &self.plans[first + 1], slots);
-            open.extend([(first + 1, slots - k), (first, k)]);
-        }
-        children
-    }
-
-    /// The wide tree over `root`; subtrees of fewer than `grain` items are left out.
-    fn part(&self, root: usize, grain: usize) -> Part {
-        let mut part = Part {
-            nodes: vec![Node::EMPTY],
-            ..Part::default()
+            leaf: as_leaf <= as_node && is_small,
+            alone,
         };
-        let mut open = vec![(root, 0, 1)];
-        while let Some((node, place, level)) = open.pop() {
-            part.levels = part.levels.max(level);
-            if (self.plans[node].items as usize) < grain {
-                part.deferred.push((place, node, level));
-                continue;
-            }
-            let children = self.children(node);
-            let boxes = children.iter().map(|child| {
-                let aabb = self.nodes[*child].aabb();
-                Bounds {
-                    min: aabb.min.into(),
-                    max: aabb.max.into(),
-                }
-            });
-            let mut wide = Node::new(&boxes.collect::<Vec<_>>());
-            let begin = open.len();
-            for (lane, child) in children.into_iter().enumerate() {
-                wide.children[lane] = if self.plans[child].leaf {
-                    self.leaf(child, &mut part)
-                } else {
-                    open.push((child, part.nodes.len(), level + 1));
-                    part.nodes.push(Node::EMPTY);
-                    part.nodes.len() as u32 - 1
-                };
-            }
-            open[begin..].reverse();
-            part.nodes[place] = wide;
-        }
-        part
+        (plan, shares)
     }
 
-    /// Makes a leaf of a binary subtree, and names it.
-    fn leaf(&self, node: usize, part: &mut Part) -> u32 {
-        let (mut open, mut triangles) = (vec![node], Vec::with_capacity(BLOCK));
-        while let Some(node) = open.pop() {
-            let node = &self.nodes[node];
-            if !node.is_leaf() {
-                open.extend([node.first_index as usize, node.first_index as usize + 1]);
-                continue;
-            }
-            if !self.leaves.is_triangle(node.first_index) {
-                part.others.push(node.first_index);
-                return OTHER | (part.others.len() as u32 - 1);
-            }
-            triangles.push(self.leaves.triangle(node.first_index));
+    /// The plan of a subtree that is an item of another tree.
+    pub(super) fn subtree(&self) -> Self {
+        Self {
+            alone: true,
+            leaf: true,
+            ..*self
         }
-        part.blocks.push(Block::new(&mut triangles));
-        Block::name(part.blocks.len() - 1, triangles.len())
+    }
+
+    /// As how many children it is worth having, where there may be so many.
+    fn worth(&self, slots: usize) -> usize {
+        let cheaper = |slots: &usize| self.cost[*slots - 1] < self.cost[*slots - 2];
+        (2..=slots.min(WIDTH - 1)).rev().find(cheaper).unwrap_or(1)
     }
 }
 
-impl Part {
-    /// The whole tree, with the parts that were left out.
-    fn joined(mut self, parts: Vec<Part>) -> (Tree, Vec<u32>) {
-        let deferred = std::mem::take(&mut self.deferred);
-        let total = |count: fn(&Part) -> usize| parts.iter().map(count).sum::<usize>();
-        self.nodes.reserve_exact(total(|part| part.nodes.len()));
-        self.blocks.reserve_exact(total(|part| part.blocks.len()));
-        self.others.reserve_exact(total(|part| part.others.len()));
-        for (part, (place, _, level)) in parts.into_iter().zip(deferred) {
-            let (nodes, blocks, others) = (
-                // Its root stands elsewhere.
-                self.nodes.len() as u32 - 1,
-                self.blocks.len() as u32,
-                self.others.len() as u32,
-            );
-            let renamed = |mut node: Node| {
-                for name in &mut node.children {
-                    *name += match *name {
-                        u32::MAX => 0,
-                        name if name >= OTHER => others,
-                        name if name >= LEAF => blocks,
-                        _ => nodes,
-                    };
-                }
-                node
-            };
-            let mut made = part.nodes.into_iter().map(renamed);
-            self.nodes[place] = made.next().expect("a part has a root");
-            self.nodes.extend(made);
-            self.blocks.extend(part.blocks);
-            self.others.extend(part.others);
-            self.levels = self.levels.max(level + part.levels - 1);
+/// A binary node, and what becomes of it, in 8 bytes.
+#[derive(Clone, Copy, Debug)]
+struct Choice {
+    /// Its children, or its item.
+    first: u32,
+    /// Three bits each for 2, 3, … 8 children: how many its first child gets; 0 if it is no better with them
+    /// than with one less. Then whether it is an item, and whether it is a leaf.
+    bits: u32,
+}
+
+impl Choice {
+    const ITEM: u32 = 1 << 24;
+    const LEAF: u32 = 1 << 25;
+
+    fn new(node: &Bvh2Node, plan: &Plan, shares: [usize; WIDTH + 1]) -> Self {
+        let mut bits = 0;
+        for (slots, share) in shares.into_iter().enumerate().skip(2) {
+            bits |= ((share & 7) as u32) << (3 * (slots - 2));
         }
-        assert!(
-            self.nodes.len() < LEAF as usize,
-            "a tree of fewer than 2³¹ nodes"
-        );
-        assert!(
-            self.blocks.len() < BLOCK_INDEX as usize,
-            "a tree of fewer than 2²⁸ blocks"
-        );
-        assert!(
-            self.others.len() < OTHER_INDEX as usize,
-            "fewer than 2³⁰ other items"
-        );
-        let tree = Tree {
-            nodes: {
-                let mut n = super::huge::Huge::filled(self.nodes.len(), Node::EMPTY);
-                n.copy_from_slice(&self.nodes);
-                n
-            },
-            blocks: {
-                let mut n = super::huge::Huge::filled(self.blocks.len(), Block::EMPTY);
-                n.copy_from_slice(&self.blocks);
-                n
-            },
-            levels: self.levels,
+        if node.is_leaf() {
+            bits |= Self::ITEM;
+        }
+        if plan.leaf {
+            bits |= Self::LEAF;
+        }
+        Self {
+            first: node.first_index,
+            bits,
+        }
+    }
+
+    fn is_item(self) -> bool {
+        self.bits & Self::ITEM != 0
+    }
+
+    fn is_leaf(self) -> bool {
+        self.bits & Self::LEAF != 0
+    }
+
+    /// How many of so many children the first child gets.
+    #[inline]
+    fn share(self, slots: usize) -> usize {
+        (self.bits >> (3 * (slots - 2)) & 7) as usize
+    }
+}
+
+/// A binary tree and what is to become of it.
+#[derive(Debug)]
+pub(super) struct Collapse {
+    choices: Vec<Choice>,
+}
+
+impl Collapse {
+    /// Plans for a tree with parents before children; leaves are asked for theirs.
+    pub(super) fn new(nodes: &[Bvh2Node], leaf: impl Fn(&Bvh2Node) -> Plan) -> (Self, Vec<Plan>) {
+        let mut plans = vec![Plan::default(); nodes.len()];
+        let nothing = Choice { first: 0, bits: 0 };
+        let mut choices = vec![nothing; nodes.len()];
+        for (i, node) in nodes.iter().enumerate().rev() {
+            let (plan, shares) = if node.is_leaf() {
+                let plan = leaf(node);
+                // Where it is worth having as several children, it has itself shared out.
+                let worth = |slots| usize::from(slots > 1 && plan.worth(slots) == slots);
+                (plan, std::array::from_fn(worth))
+            } else {
+                let child = node.first_index as usize;
+                Plan::over(area(node), &plans[child], &plans[child + 1])
+            };
+            plans[i] = plan;
+            choices[i] = Choice::new(node, &plan, shares);
+        }
+        (Self { choices }, plans)
+    }
+
+    /// The binary nodes that stand for `node` as at most so many children, each one of them; items as many as
+    /// they were shared out to.
+    fn children(&self, node: usize, slots: usize, children: &mut Vec<(usize, usize)>) {
+        // No two wait whose slots are more than eight.
+        let (mut open, mut height) = ([(0, 0); WIDTH], 1);
+        open[0] = (node, slots);
+        while height > 0 {
+            height -= 1;
+            let (node, mut slots) = open[height];
+            let choice = self.choices[node];
+            while slots > 1 && choice.share(slots) == 0 {
+                slots -= 1;
+            }
+            if slots == 1 || choice.is_item() {
+                children.push((node, slots));
+                continue;
+            }
+            let (k, first) = (choice.share(slots), choice.first as usize);
+            open[height] = (first + 1, slots - k);
+            open[height + 1] = (first, k);
+            height += 2;
+        }
+    }
+
+    /// The wide tree. An item that was shared out stands there as often.
+    pub(super) fn sketch(&self) -> Sketch {
+        let mut drawing = Drawing::new(self, 0);
+        drawing.open.push((0, 0));
+        drawing.sketch.nodes.push(Stroke::default());
+        drawing.finish()
+    }
+
+    /// Subtrees: the binary nodes over them, and as how many children each is wanted. The sketch has as many
+    /// heads in all, in the same order.
+    pub(super) fn subtrees(&self, roots: &[(usize, usize)]) -> Sketch {
+        let mut heads = Vec::new();
+        for (root, slots) in roots {
+            self.children(*root, *slots, &mut heads);
+        }
+        let mut drawing = Drawing::new(self, heads.len());
+        for (place, heads) in heads.chunks(WIDTH).enumerate() {
+            drawing.stroke(heads, place);
+        }
+        drawing.finish()
+    }
+}
+
+/// A sketch in the making.
+struct Drawing<'c> {
+    collapse: &'c Collapse,
+    sketch: Sketch,
+    /// Binary nodes that are still to be drawn, and where.
+    open: Vec<(usize, usize)>,
+}
+
+impl<'c> Drawing<'c> {
+    fn new(collapse: &'c Collapse, heads: usize) -> Self {
+        let sketch = Sketch {
+            heads: heads as u32,
+            nodes: vec![Stroke::default(); heads.div_ceil(WIDTH)],
+            items: Vec::new(),
         };
-        (tree, self.others)
+        Self {
+            collapse,
+            sketch,
+            open: Vec::new(),
+        }
+    }
+
+    /// Draws what waits, and all below.
+    fn finish(mut self) -> Sketch {
+        let mut children = Vec::with_capacity(WIDTH);
+        while let Some((node, place)) = self.open.pop() {
+            children.clear();
+            if self.collapse.choices[node].is_leaf() {
+                children.push((node, 1));
+            } else {
+                self.collapse.children(node, WIDTH, &mut children);
+            }
+            self.stroke(&children, place);
+        }
+        self.sketch
+    }
+
+    /// Draws a node over these children, and has those that are nodes opened, the first one next.
+    fn stroke(&mut self, children: &[(usize, usize)], place: usize) {
+        let sketch = &mut self.sketch;
+        let mut stroke = Stroke {
+            first_node: sketch.nodes.len() as u32,
+            first_item: sketch.items.len() as u32,
+            ..Stroke::default()
+        };
+        let begin = self.open.len();
+        let mut lane = 0;
+        for (child, times) in children {
+            let choice = self.collapse.choices[*child];
+            for _ in 0..*times {
+                stroke.children[lane] = if choice.is_leaf() {
+                    let first = sketch.items.len();
+                    self.collapse.items(*child, &mut sketch.items);
+                    (sketch.items.len() - first) as u8
+                } else {
+                    self.open.push((*child, sketch.nodes.len()));
+                    sketch.nodes.push(Stroke::default());
+                    INNER
+                };
+                lane += 1;
+            }
+        }
+        self.open[begin..].reverse();
+        sketch.nodes[place] = stroke;
+    }
+}
+
+impl Collapse {
+    /// The items of a leaf.
+    fn items(&self, leaf: usize, items: &mut Vec<u32>) {
+        let (mut open, mut height) = ([leaf; BLOCK], 1);
+        while height > 0 {
+            height -= 1;
+            let choice = self.choices[open[height]];
+            if choice.is_item() {
+                items.push(choice.first);
+                continue;
+            }
+            let child = choice.first as usize;
+            (open[height], open[height + 1]) = (child, child + 1);
+            height += 2;
+        }
     }
 }

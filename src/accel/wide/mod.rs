@@ -5,24 +5,33 @@
 //! Items that are no triangles (spheres, instances) stand in the same tree as leaves of their own, and
 //! are met by whoever asked for the walk.
 
+mod assembly;
 #[cfg(target_arch = "x86_64")]
 mod avx;
 #[cfg(target_arch = "x86_64")]
 mod avx512;
 mod batch;
+mod binary;
 mod build;
+mod cache;
+mod chunks;
 mod collapse;
 mod compiled;
+mod crown;
 mod huge;
 mod kernel;
 mod node;
 mod portable;
+mod sketch;
 mod state;
 
+use std::path::Path;
+
 use glam::Vec3;
+use rayon::prelude::*;
 
 use super::triangle::Shear;
-use super::{Build, Counts};
+use super::{Build, CacheUse, Counts};
 use crate::shape::Bounds;
 use huge::Huge;
 use node::{BLOCK, Block, Node};
@@ -43,6 +52,10 @@ pub(super) trait Walker {
 
 /// The items that a tree is built over.
 pub(super) trait Leaves: Sync {
+    /// How many there are.
+    fn count(&self) -> u32;
+    /// An item's box, finite and not empty.
+    fn bounds(&self, item: u32) -> Bounds;
     /// Whether an item is a triangle.
     fn is_triangle(&self, item: u32) -> bool;
     /// A triangle's number in the scene, and its corners.
@@ -70,13 +83,27 @@ impl Default for Tree {
 }
 
 impl Tree {
-    /// A tree over items with these boxes, which are finite and not empty; and the items that are no
-    /// triangles, in the order in which the walker is asked for them.
-    pub(super) fn build(boxes: &[Bounds], leaves: &impl Leaves, work: Build) -> (Self, Vec<u32>) {
-        match build::binary(boxes, work) {
-            Some(binary) => collapse::collapse(&binary, leaves),
-            None => Default::default(),
+    /// A tree over these items; and those of them that are no triangles, in the order in which the walker is
+    /// asked for them. In the folder `cache` it may lie ready, and is laid down otherwise.
+    pub(super) fn build(
+        leaves: &impl Leaves,
+        work: Build,
+        cache: Option<&Path>,
+    ) -> (Self, Vec<u32>, CacheUse) {
+        if leaves.count() == 0 {
+            return Default::default();
         }
+        let boxes: Vec<Bounds> = (0..leaves.count())
+            .into_par_iter()
+            .map(|item| leaves.bounds(item))
+            .collect();
+        let cache = cache.filter(|_| leaves.count() >= WORTH_KEEPING);
+        let (sketches, used) = match cache {
+            Some(folder) => cache::through(folder, &boxes, leaves, work),
+            None => (build::build(&boxes, leaves, work), CacheUse::default()),
+        };
+        let (tree, others) = sketches.tree(&boxes, leaves);
+        (tree, others, used)
     }
 
     /// Nodes on the longest way down.
@@ -136,8 +163,15 @@ impl Tree {
     }
 }
 
+/// Trees over fewer items are built as soon as they are found.
+const WORTH_KEEPING: u32 = 10_000;
+
 /// Trees up to this size are in the caches nearest to a core, as far as counts.
 const CACHED: usize = 16 << 20;
 
+#[cfg(test)]
+mod build_tests;
+#[cfg(test)]
+mod cache_tests;
 #[cfg(test)]
 mod tests;

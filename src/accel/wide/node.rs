@@ -83,9 +83,16 @@ impl Node {
                 Some(Bounds { min, max }) => toward.dot(0.25 * *min + 0.25 * *max),
                 None => f32::INFINITY,
             };
-            let mut lanes: [usize; WIDTH] = std::array::from_fn(|lane| lane);
-            lanes.sort_by(|a, b| depth(*b).total_cmp(&depth(*a)));
-            for (place, lane) in lanes.into_iter().enumerate() {
+            let depths: [f32; WIDTH] = std::array::from_fn(depth);
+            for lane in 0..WIDTH {
+                // Counted rather than sorted: eight at once, and without a branch.
+                let place: usize = (0..WIDTH)
+                    .map(|other| {
+                        let is_farther = depths[other] > depths[lane];
+                        let is_before = (depths[other] == depths[lane]) & (other < lane);
+                        usize::from(is_farther | is_before)
+                    })
+                    .sum();
                 node.order[octant] |= (lane as u32) << (3 * place);
             }
         }
