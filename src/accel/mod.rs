@@ -141,6 +141,10 @@ pub struct Tracer {
     /// Each instance's box in the world.
     instance_bounds: Vec<Bounds>,
     groups: Vec<Group>,
+    /// Of the deepest tree of an instance.
+    inner_levels: usize,
+    /// Whether the trees do not fit into the caches near a core.
+    is_large: bool,
     method: Method,
     kernel: Kernel,
     cache: CacheUse,
@@ -187,10 +191,13 @@ impl Tracer {
             .collect();
         let world = group(&shapes_of[0], &instance_bounds);
         groups.insert(0, world);
+        let inner = groups[1..].iter().map(|group| group.tree().levels());
         Self {
             shapes,
             instances,
             instance_bounds,
+            inner_levels: inner.max().unwrap_or(0),
+            is_large: groups.iter().map(Group::bytes).sum::<usize>() > CACHED,
             groups,
             method: recipe.method,
             kernel: Kernel::best(),
@@ -255,6 +262,10 @@ impl Tracer {
         self.groups.iter().map(Group::bytes).sum()
     }
 }
+
+/// Trees up to this size are in the caches nearest to a core, as far as counts: there asking for memory ahead
+/// costs a tenth.
+const CACHED: usize = 16 << 20;
 
 /// The ray in an instance's space; t keeps its meaning, since the direction is not normalised.
 fn to_local(to_world: &Transform, ray: &Ray) -> Ray {

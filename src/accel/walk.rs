@@ -1,5 +1,5 @@
-//! One thread's way through the groups: batches through the world's tree, single rays through those of
-//! instances, every item in turn for brute force; and items that are no triangles, whoever asks.
+//! One thread's way through the groups: batches through the world's tree and those of instances, every item in
+//! turn for brute force; and items that are no triangles, whoever asks.
 
 use std::cmp::Ordering;
 
@@ -7,17 +7,15 @@ use crate::interaction::{Hit, Ray};
 use crate::shape::{Bounds, Geometry};
 
 use super::boxes::RayBoxes;
-use super::group::{Group, Item};
+use super::group::Item;
 use super::triangle::Shear;
-use super::wide::{Best, Flight, Place, Start, Walker};
+use super::wide::{Best, Met, Place, Start, Visit, Walker};
 use super::{Counts, Instance, Method, Tracer, to_local};
 
 /// See the module.
 pub(super) struct Walk<'t> {
     tracer: &'t Tracer,
     counts: &'t mut Counts,
-    /// Room for walking an instance.
-    inner: Option<Flight>,
 }
 
 /// The way by which a group is met.
@@ -43,11 +41,7 @@ fn is_sound(ray: &Ray) -> bool {
 
 impl<'t> Walk<'t> {
     pub(super) fn new(tracer: &'t Tracer, counts: &'t mut Counts) -> Self {
-        Self {
-            tracer,
-            counts,
-            inner: None,
-        }
+        Self { tracer, counts }
     }
 
     /// Improves each ray's hit.
@@ -75,26 +69,22 @@ impl<'t> Walk<'t> {
         if tracer.method == Method::Brute {
             return self.items::<_, ANY>(way, group.items(), rays, ledger);
         }
-        let (tree, kernel) = (group.tree(), tracer.kernel);
         let mut counts = Counts::default();
-        let mut inner = self.inner.take();
         let mut party = Party::<_, ANY> {
             walk: self,
-            group,
             way,
             rays,
             ledger,
         };
-        if way.instance == Hit::NONE {
-            tree.batch::<_, ANY>(kernel, &mut party, rays.len(), &mut counts);
-        } else {
-            let flight = inner.get_or_insert_with(|| {
-                let levels = tracer.groups.iter().map(|group| group.tree().levels());
-                Flight::new(1, levels.max().unwrap_or(1))
-            });
-            tree.single::<_, ANY>(kernel, &mut party, flight, &mut counts);
-        }
-        self.inner = self.inner.take().or(inner);
+        let inner_levels = tracer.inner_levels;
+        let (tree, kernel, count) = (group.tree(), tracer.kernel, rays.len());
+        tree.batch::<_, ANY>(
+            kernel,
+            (inner_levels, tracer.is_large),
+            &mut party,
+            count,
+            &mut counts,
+        );
         self.counts.add(&counts);
     }
 
@@ -126,26 +116,38 @@ impl<'t> Walk<'t> {
         &mut self,
         item: &Item,
         ray: &Ray,
+        prepared: (&RayBoxes, &Shear),
+        way: Way,
+        best: &mut Hit,
+    ) -> bool {
+        let Some(instance) = item.as_instance() else {
+            return self.primitive(item, ray, prepared, way, best);
+        };
+        let Instance { to_world, group } = &self.tracer.instances[instance as usize];
+        let bounds = &self.tracer.instance_bounds[instance as usize];
+        let Some(entry) = prepared.0.entry(bounds, best.t) else {
+            return false;
+        };
+        let way = Way {
+            group: *group,
+            instance,
+            entry,
+        };
+        let before = *best;
+        let local = to_local(to_world, ray);
+        self.rays::<[Hit], ANY>(way, &[local], std::slice::from_mut(best));
+        *best != before
+    }
+
+    /// Meets one primitive; whether it improved the hit.
+    fn primitive(
+        &mut self,
+        item: &Item,
+        ray: &Ray,
         (boxes, shear): (&RayBoxes, &Shear),
         way: Way,
         best: &mut Hit,
     ) -> bool {
-        if let Some(instance) = item.as_instance() {
-            let Instance { to_world, group } = self.tracer.instances[instance as usize];
-            let bounds = &self.tracer.instance_bounds[instance as usize];
-            let Some(entry) = boxes.entry(bounds, best.t) else {
-                return false;
-            };
-            let way = Way {
-                group,
-                instance,
-                entry,
-            };
-            let before = *best;
-            let local = to_local(&to_world, ray);
-            self.rays::<[Hit], ANY>(way, &[local], std::slice::from_mut(best));
-            return *best != before;
-        }
         self.counts.primitive_tests += 1;
         let (t, u, v, bounds) = match self.tracer.shapes.get(item.shape) {
             Geometry::Mesh(mesh) => {
@@ -234,17 +236,16 @@ impl Ledger for Shadows<'_> {
 /// Rays that walk one group's tree together.
 struct Party<'w, 't, 'r, L: ?Sized, const ANY: bool> {
     walk: &'w mut Walk<'t>,
-    group: &'t Group,
     way: Way,
     rays: &'r [Ray],
     ledger: &'r mut L,
 }
 
-impl<L: Ledger + ?Sized, const ANY: bool> Party<'_, '_, '_, L, ANY> {
-    /// A hit as the tree knows it. At an equal distance the one of the lower instance comes first, which
-    /// the tree is told by numbers that all or none of its triangles are below.
+impl<'t, L: Ledger + ?Sized, const ANY: bool> Party<'_, 't, '_, L, ANY> {
+    /// A hit as the tree of an instance or of the world knows it. At an equal distance the one of the lower
+    /// instance comes first, which the tree is told by numbers that all or none of its triangles are below.
     #[inline(always)]
-    fn best(&self, hit: &Hit) -> Best {
+    fn best(&self, hit: &Hit, instance: u32) -> Best {
         if hit.is_miss() {
             return Best {
                 t: hit.t,
@@ -252,7 +253,7 @@ impl<L: Ledger + ?Sized, const ANY: bool> Party<'_, '_, '_, L, ANY> {
                 place: Place::NOWHERE,
             };
         }
-        let id = match hit.instance.cmp(&self.way.instance) {
+        let id = match hit.instance.cmp(&instance) {
             Ordering::Less => 0,
             Ordering::Greater => u32::MAX,
             Ordering::Equal => {
@@ -268,59 +269,92 @@ impl<L: Ledger + ?Sized, const ANY: bool> Party<'_, '_, '_, L, ANY> {
     }
 
     /// The triangle that the tree found.
-    fn triangle(&self, best: Best, (u, v): (f32, f32)) -> Hit {
+    fn triangle(&self, best: Best, instance: u32, (u, v): (f32, f32)) -> Hit {
         let Item { shape, index } = self.walk.tracer.shapes.numbered(best.id);
         Hit {
             t: best.t,
             u,
             v,
-            instance: self.way.instance,
+            instance,
             shape,
             primitive: index,
         }
     }
+
+    /// The best that is known of a ray.
+    fn known(&self, visit: &Visit) -> Hit {
+        if visit.best.is_inside() {
+            self.triangle(visit.best, visit.instance, (0.0, 0.0))
+        } else {
+            self.ledger.hit(visit.ray)
+        }
+    }
+
+    /// The tree of an instance, and how it is entered.
+    fn instance(&self, visit: &Visit, instance: u32) -> Option<Met<'t>> {
+        let tracer = self.walk.tracer;
+        let bounds = &tracer.instance_bounds[instance as usize];
+        let entry = visit.boxes.entry(bounds, visit.best.t)?;
+        let Instance { to_world, group } = &tracer.instances[instance as usize];
+        let start = Start {
+            ray: to_local(to_world, &self.rays[visit.ray]),
+            instance,
+            entry,
+            best: self.best(&self.known(visit), instance),
+        };
+        Some(Met::Instance(tracer.groups[*group as usize].tree(), start))
+    }
 }
 
-impl<L: Ledger + ?Sized, const ANY: bool> Walker for Party<'_, '_, '_, L, ANY> {
+impl<'t, L: Ledger + ?Sized, const ANY: bool> Walker<'t> for Party<'_, 't, '_, L, ANY> {
     #[inline(always)]
     fn start(&self, ray: usize) -> Start {
         Start {
             ray: self.rays[ray],
+            instance: self.way.instance,
             entry: self.way.entry,
-            best: self.best(&self.ledger.hit(ray)),
+            best: self.best(&self.ledger.hit(ray), self.way.instance),
         }
     }
 
-    fn other(&mut self, ray: usize, item: u32, best: Best) -> Option<Best> {
-        let mut hit = if best.is_inside() {
-            self.triangle(best, (0.0, 0.0))
+    fn other(&mut self, visit: &Visit, item: u32) -> Met<'t> {
+        let tracer = self.walk.tracer;
+        let outside = visit.instance == self.way.instance;
+        let (way, from) = if outside {
+            (self.way, self.rays[visit.ray])
         } else {
-            self.ledger.hit(ray)
+            let Instance { to_world, group } = &tracer.instances[visit.instance as usize];
+            let way = Way {
+                group: *group,
+                instance: visit.instance,
+                entry: visit.entry,
+            };
+            (way, to_local(to_world, &self.rays[visit.ray]))
         };
-        let (from, item) = (self.rays[ray], self.group.items()[item as usize]);
-        let (boxes, shear) = (RayBoxes::new(&from), Shear::new(&from));
-        let found = self
-            .walk
-            .item::<ANY>(&item, &from, (&boxes, &shear), self.way, &mut hit);
-        found.then(|| {
-            self.ledger.improve(ray, hit);
-            self.best(&hit)
-        })
+        let item = tracer.groups[way.group as usize].items()[item as usize];
+        if let Some(instance) = item.as_instance() {
+            return self.instance(visit, instance).unwrap_or(Met::Nothing);
+        }
+        let mut hit = self.known(visit);
+        let prepared = (&visit.boxes, &visit.shear);
+        if !(self.walk).primitive(&item, &from, prepared, way, &mut hit) {
+            return Met::Nothing;
+        }
+        self.ledger.improve(visit.ray, hit);
+        Met::Better(self.best(&hit, visit.instance))
     }
 
     #[inline(always)]
-    fn end(&mut self, ray: usize, best: Best, uv: (f32, f32)) {
-        if best.is_inside() {
-            // Whoever wants any hit knows no number of it.
-            let hit = if ANY {
-                Hit {
-                    shape: 0,
-                    ..Hit::miss(best.t)
-                }
-            } else {
-                self.triangle(best, uv)
-            };
-            self.ledger.improve(ray, hit);
-        }
+    fn found(&mut self, ray: usize, instance: u32, best: Best, uv: (f32, f32)) {
+        // Whoever wants any hit knows no number of it.
+        let hit = if ANY {
+            Hit {
+                shape: 0,
+                ..Hit::miss(best.t)
+            }
+        } else {
+            self.triangle(best, instance, uv)
+        };
+        self.ledger.improve(ray, hit);
     }
 }

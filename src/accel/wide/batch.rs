@@ -1,4 +1,4 @@
-//! Walking the tree: many rays in flight, or one.
+//! Walking the tree, many rays in flight.
 //!
 //! A walk is a chain of loads that wait for each other, and of branches that nobody can foretell. So a
 //! batch keeps dozens of rays on their way and takes them in rounds: all that are at a node go a step,
@@ -11,10 +11,13 @@
 use std::hint::select_unpredictable;
 
 use super::kernel::{Ends, FILED, Lanes};
-use super::node::{BLOCK_INDEX, DONE, Entry, LEAF, OTHER, OTHER_INDEX, WIDTH, triangles_of};
+use super::node::{
+    BLOCK, BLOCK_INDEX, DONE, EXIT, Entry, LEAF, LEAVE, OTHER, OTHER_INDEX, WIDTH, triangles_of,
+};
 use super::state::{Best, Flight, State};
-use super::{Tree, Walker};
+use super::{Met, Tree, Walker};
 use crate::accel::Counts;
+use crate::accel::triangle::Shear;
 
 /// Rays on their way at once. Fewer wait for memory, more fall out of the nearest cache.
 pub(super) const IN_FLIGHT: usize = 48;
@@ -32,14 +35,15 @@ struct Lists {
     currents: List,
 }
 
-/// The tree and the stacks, by pointers.
+/// All stacks.
 #[derive(Clone, Copy)]
-struct Places<'t> {
-    tree: &'t Tree,
-    stacks: *mut Entry,
+struct Stacks {
+    start: *mut Entry,
+    /// How many levels of an inner tree a ray has room for beside all of the outer one's.
+    inner_levels: usize,
 }
 
-impl Places<'_> {
+impl Stacks {
     /// Enters a node: its children go onto the stack, and the nearest comes from it. Where there is none,
     /// the next comes from below.
     ///
@@ -56,28 +60,28 @@ impl Places<'_> {
             } else {
                 self.below::<L>(ray)
             };
-            let node = self.tree.nodes.get_unchecked(ray.current as usize);
-            let count = L::enter(node, ray, self.stacks.add(top));
+            let node = &*ray.nodes.add(ray.current as usize);
+            let count = L::enter(node, ray, self.start.add(top));
             ray.top = select_unpredictable(count == 0, below, top as u32 + count - 1);
-            ray.current = *self.stacks.add(ray.top as usize) as u32;
+            ray.current = *self.start.add(ray.top as usize) as u32;
         }
     }
 
     /// The highest place on the stack that is not beyond the limit, among eight.
     ///
     /// # Safety
-    /// As [`Places::step`].
+    /// As [`Stacks::step`].
     #[inline(always)]
     unsafe fn below<L: Lanes>(self, ray: &State) -> u32 {
         let lowest = ray.top - WIDTH as u32;
         // SAFETY: eight sentinels are at the bottom.
-        lowest + unsafe { L::pop(self.stacks.add(lowest as usize), ray.bound) }
+        lowest + unsafe { L::pop(self.start.add(lowest as usize), ray.bound) }
     }
 
     /// What comes next where the present leads nowhere.
     ///
     /// # Safety
-    /// As [`Places::step`].
+    /// As [`Stacks::step`].
     #[inline(always)]
     unsafe fn next<L: Lanes, const ANY: bool>(self, ray: &State) -> (u32, u32) {
         // SAFETY: as for `step`.
@@ -87,7 +91,7 @@ impl Places<'_> {
             } else {
                 self.below::<L>(ray)
             };
-            (top, *self.stacks.add(top as usize) as u32)
+            (top, *self.start.add(top as usize) as u32)
         }
     }
 
@@ -99,7 +103,7 @@ impl Places<'_> {
     unsafe fn inside<L: Lanes>(self, ray: &mut State) -> u32 {
         let index = (ray.current & BLOCK_INDEX) as usize;
         // SAFETY: the index is a block's.
-        let lanes = unsafe { L::inside(self.tree.blocks.get_unchecked(index), ray) };
+        let lanes = unsafe { L::inside(&*ray.blocks.add(index), ray) };
         ray.lanes = lanes as u8;
         lanes
     }
@@ -107,12 +111,12 @@ impl Places<'_> {
     /// Takes the best of the triangles that the line goes through; whether there is any.
     ///
     /// # Safety
-    /// As [`Places::inside`].
+    /// As [`Stacks::inside`].
     #[inline(always)]
     unsafe fn meet<L: Lanes>(self, ray: &mut State) -> bool {
         let index = ray.current & BLOCK_INDEX;
         // SAFETY: the index is a block's.
-        let block = unsafe { self.tree.blocks.get_unchecked(index as usize) };
+        let block = unsafe { &*ray.blocks.add(index as usize) };
         // SAFETY: the caller has what `L` needs.
         let (t, lane) = unsafe { L::meet(block, ray) };
         let (id, limit) = (block.ids[lane], ray.limit());
@@ -123,22 +127,43 @@ impl Places<'_> {
         better
     }
 
-    /// Deals with rays at items that are no triangles, until each is at a node or a block, or done.
+    /// Deals with a ray at items that are no triangles, or at an instance's end, until it is at a node or a block,
+    /// or done.
     ///
     /// # Safety
-    /// As [`Places::step`].
+    /// As [`Stacks::step`]; above the top is room for an entry and for what the walker's inner trees leave.
     #[inline(always)]
-    unsafe fn others<L: Lanes, W: Walker, const ANY: bool>(self, ray: &mut State, walker: &mut W) {
+    unsafe fn others<'t, L: Lanes, W: Walker<'t>, const ANY: bool>(
+        self,
+        ray: &mut State,
+        tree: &'t Tree,
+        walker: &mut W,
+    ) {
         while ray.current >= OTHER && ray.current != DONE {
-            let item = ray.current & OTHER_INDEX;
-            let found = walker.other(ray.ray as usize, item, ray.best());
-            if let Some(Best { t, id, place }) = found {
-                ray.reach(t);
-                (ray.id, ray.place) = (id, place.0);
-            }
-            if ANY && found.is_some() {
-                ray.current = DONE;
-                return;
+            if ray.current == LEAVE {
+                found::<W, ANY>(walker, ray);
+                ray.enter(tree, &walker.start(ray.ray as usize));
+            } else {
+                match walker.other(&ray.visit(), ray.current & OTHER_INDEX) {
+                    Met::Nothing => {}
+                    Met::Better(Best { t, id, place }) => {
+                        ray.reach(t);
+                        (ray.id, ray.place) = (id, place.0);
+                        if ANY {
+                            ray.current = DONE;
+                            return;
+                        }
+                    }
+                    Met::Instance(inner, start) => {
+                        assert!(inner.levels <= self.inner_levels, "room for the tree");
+                        found::<W, ANY>(walker, ray);
+                        // SAFETY: there is room.
+                        unsafe { *self.start.add(ray.top as usize) = EXIT };
+                        ray.top += 1;
+                        ray.enter(inner, &start);
+                        return;
+                    }
+                }
             }
             // SAFETY: as for `step`.
             (ray.top, ray.current) = unsafe { self.next::<L, ANY>(ray) };
@@ -147,17 +172,18 @@ impl Places<'_> {
 
     /// Asks for what the ray will need in the next round.
     #[inline(always)]
-    fn fetch(self, current: u32) {
+    fn fetch(self, ray: &State) {
         #[cfg(target_arch = "x86_64")]
         {
             use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+            let current = ray.current;
             let index = (current & BLOCK_INDEX) as usize;
-            let node = self.tree.nodes.as_ptr().wrapping_add(current as usize);
-            let block = self.tree.blocks.as_ptr().wrapping_add(index);
+            let node = ray.nodes.wrapping_add(current as usize);
+            let block = ray.blocks.wrapping_add(index);
             let at = select_unpredictable(current >= LEAF, block.cast::<i8>(), node.cast());
             // What is no place in memory would be looked for in all tables of pages.
             let at =
-                select_unpredictable(current >= OTHER, self.stacks.cast::<i8>().cast_const(), at);
+                select_unpredictable(current >= OTHER, self.start.cast::<i8>().cast_const(), at);
             for line in 0..4 {
                 // SAFETY: a hint never faults, wherever it points.
                 unsafe { _mm_prefetch::<_MM_HINT_T0>(at.wrapping_add(64 * line)) };
@@ -166,26 +192,39 @@ impl Places<'_> {
     }
 }
 
-fn places<'t>(tree: &'t Tree, flight: &mut Flight) -> Places<'t> {
-    Places {
-        tree,
-        stacks: flight.stacks.as_mut_ptr(),
+/// Hands a triangle of the tree that the ray is in to the walker, if it is the best.
+#[inline(always)]
+fn found<'t, W: Walker<'t>, const ANY: bool>(walker: &mut W, ray: &State) {
+    let best = ray.best();
+    if !best.is_inside() {
+        return;
     }
+    let mut uv = (0.0, 0.0);
+    if !ANY {
+        // SAFETY: the place is a triangle's in the tree that the ray is in.
+        let block = unsafe { &*ray.blocks.add(ray.place as usize / BLOCK) };
+        let corners = block.triangle(ray.place as usize % BLOCK);
+        uv = Shear::barycentric(ray.shear().edges(corners));
+    }
+    walker.found(ray.ray as usize, ray.instance, best, uv);
 }
 
 /// Walks `count` rays.
 ///
 /// # Safety
-/// The processor has the instructions of `L`, and `flight` was made for trees of this one's levels.
+/// The processor has the instructions of `L`, and `flight` was made for more levels than the tree has.
 #[inline(always)]
-pub(super) unsafe fn batch<L: Lanes, W: Walker, const ANY: bool, const FETCH: bool>(
-    tree: &Tree,
+pub(super) unsafe fn batch<'t, L: Lanes, W: Walker<'t>, const ANY: bool, const FETCH: bool>(
+    tree: &'t Tree,
     walker: &mut W,
     count: usize,
     flight: &mut Flight,
     counts: &mut Counts,
 ) {
-    let places = places(tree, flight);
+    let stacks = Stacks {
+        start: flight.stacks.as_mut_ptr(),
+        inner_levels: flight.levels() - tree.levels - 1,
+    };
     let slots = flight.states.len().min(count).min(IN_FLIGHT);
     const NONE: List = [0; IN_FLIGHT + FILED];
     let mut lists = Lists {
@@ -198,7 +237,7 @@ pub(super) unsafe fn batch<L: Lanes, W: Walker, const ANY: bool, const FETCH: bo
     let bottoms: [u32; IN_FLIGHT] = std::array::from_fn(|slot| flight.bottom(slot));
     let states = flight.states.as_mut_ptr();
     for (slot, state) in flight.states.iter_mut().enumerate().take(slots) {
-        state.begin(slot as u32, &walker.start(slot), bottoms[slot]);
+        state.begin(slot as u32, tree, &walker.start(slot), bottoms[slot]);
         lists.nodes[0][slot] = slot as u32;
     }
     let (mut next, mut node_count, mut leaf_count) = (slots, slots, 0);
@@ -217,10 +256,10 @@ pub(super) unsafe fn batch<L: Lanes, W: Walker, const ANY: bool, const FETCH: bo
             node_steps += node_count as u64;
             for i in 0..node_count {
                 let ray = &mut *states.add(*nodes.add(i) as usize);
-                places.step::<L, ANY>(ray);
+                stacks.step::<L, ANY>(ray);
                 *currents.add(i) = ray.current;
                 if FETCH {
-                    places.fetch(ray.current);
+                    stacks.fetch(ray);
                 }
             }
             let mut ends = Ends {
@@ -236,12 +275,12 @@ pub(super) unsafe fn batch<L: Lanes, W: Walker, const ANY: bool, const FETCH: bo
                 let ray = &mut *states.add(slot as usize);
                 triangle_tests += triangles_of(ray.current);
                 *inside.add(inside_count) = slot;
-                inside_count += usize::from(places.inside::<L>(ray) != 0);
+                inside_count += usize::from(stacks.inside::<L>(ray) != 0);
             }
             for i in 0..inside_count {
                 let slot = *inside.add(i);
                 let ray = &mut *states.add(slot as usize);
-                let better = places.meet::<L>(ray);
+                let better = stacks.meet::<L>(ray);
                 if ANY {
                     // At the bottom nothing is left to be visited.
                     let bottom = bottoms.get_unchecked(slot as usize) + 1;
@@ -250,10 +289,10 @@ pub(super) unsafe fn batch<L: Lanes, W: Walker, const ANY: bool, const FETCH: bo
             }
             for i in 0..leaf_count {
                 let ray = &mut *states.add(*leaves.add(i) as usize);
-                (ray.top, ray.current) = places.next::<L, ANY>(ray);
+                (ray.top, ray.current) = stacks.next::<L, ANY>(ray);
                 *currents.add(i) = ray.current;
                 if FETCH {
-                    places.fetch(ray.current);
+                    stacks.fetch(ray);
                 }
             }
             ends.leaves = later_leaves;
@@ -263,13 +302,14 @@ pub(super) unsafe fn batch<L: Lanes, W: Walker, const ANY: bool, const FETCH: bo
             for i in 0..rest_count {
                 let slot = *rest.add(i);
                 let ray = &mut *states.add(slot as usize);
-                places.others::<L, W, ANY>(ray, walker);
+                stacks.others::<L, W, ANY>(ray, tree, walker);
                 if ray.current == DONE {
-                    tree.end::<W, ANY>(walker, ray);
+                    found::<W, ANY>(walker, ray);
                     if next == count {
                         continue;
                     }
-                    ray.begin(next as u32, &walker.start(next), bottoms[slot as usize]);
+                    let bottom = bottoms[slot as usize];
+                    ray.begin(next as u32, tree, &walker.start(next), bottom);
                     next += 1;
                 }
                 *rest.add(ready) = slot;
@@ -290,39 +330,4 @@ pub(super) unsafe fn batch<L: Lanes, W: Walker, const ANY: bool, const FETCH: bo
     }
     counts.node_steps += node_steps;
     counts.primitive_tests += u64::from(triangle_tests);
-}
-
-/// Walks one ray.
-///
-/// # Safety
-/// As [`batch`].
-#[inline(always)]
-pub(super) unsafe fn single<L: Lanes, W: Walker, const ANY: bool>(
-    tree: &Tree,
-    walker: &mut W,
-    flight: &mut Flight,
-    counts: &mut Counts,
-) {
-    let places = places(tree, flight);
-    let mut ray = State::IDLE;
-    ray.begin(0, &walker.start(0), flight.bottom(0));
-    // SAFETY: as for `batch`.
-    unsafe {
-        while ray.current != DONE {
-            if ray.current < LEAF {
-                counts.node_steps += 1;
-                places.step::<L, ANY>(&mut ray);
-            } else if ray.current < OTHER {
-                counts.primitive_tests += u64::from(triangles_of(ray.current));
-                let blocked = places.inside::<L>(&mut ray) != 0 && places.meet::<L>(&mut ray);
-                (ray.top, ray.current) = places.next::<L, ANY>(&ray);
-                if ANY && blocked {
-                    break;
-                }
-            } else {
-                places.others::<L, W, ANY>(&mut ray, walker);
-            }
-        }
-    }
-    tree.end::<W, ANY>(walker, &ray);
 }

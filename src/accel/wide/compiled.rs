@@ -1,4 +1,4 @@
-//! The walks, compiled for each set of instructions, and the choice between them: once a batch.
+//! The walk, compiled for each set of instructions, and the choice between them: once a batch.
 
 #![allow(unsafe_code)]
 
@@ -9,15 +9,15 @@ use super::{Flight, Tree, Walker};
 use crate::accel::Counts;
 
 /// Walks `count` rays; with `FETCH`, asks for memory ahead.
-pub(super) fn batch<W: Walker, const ANY: bool, const FETCH: bool>(
+pub(super) fn batch<'t, W: Walker<'t>, const ANY: bool, const FETCH: bool>(
     Kernel(set): Kernel,
-    tree: &Tree,
+    tree: &'t Tree,
     walker: &mut W,
     count: usize,
     flight: &mut Flight,
     counts: &mut Counts,
 ) {
-    assert!(flight.levels() >= tree.levels(), "room for the tree");
+    assert!(flight.levels() > tree.levels(), "room for the tree");
     // SAFETY: a `Kernel` exists only where the processor has its instructions, and there is room.
     unsafe {
         match set {
@@ -32,28 +32,7 @@ pub(super) fn batch<W: Walker, const ANY: bool, const FETCH: bool>(
     }
 }
 
-/// Walks one ray.
-pub(super) fn single<W: Walker, const ANY: bool>(
-    Kernel(set): Kernel,
-    tree: &Tree,
-    walker: &mut W,
-    flight: &mut Flight,
-    counts: &mut Counts,
-) {
-    assert!(flight.levels() >= tree.levels(), "room for the tree");
-    // SAFETY: as for `batch`.
-    unsafe {
-        match set {
-            Set::Portable => walks::single::<Portable, W, ANY>(tree, walker, flight, counts),
-            #[cfg(target_arch = "x86_64")]
-            Set::Avx2 => avx2::single::<W, ANY>(tree, walker, flight, counts),
-            #[cfg(target_arch = "x86_64")]
-            Set::Avx512 => avx512::single::<W, ANY>(tree, walker, flight, counts),
-        }
-    }
-}
-
-/// A module with both walks, compiled for some instructions.
+/// A module with the walk, compiled for some instructions.
 #[cfg(target_arch = "x86_64")]
 macro_rules! compile {
     ($name:ident, $kernel:ident::$lanes:ident, $features:literal) => {
@@ -64,8 +43,8 @@ macro_rules! compile {
             /// # Safety
             /// As for the walk itself.
             #[target_feature(enable = $features)]
-            pub(super) unsafe fn batch<W: Walker, const ANY: bool, const FETCH: bool>(
-                tree: &Tree,
+            pub(super) unsafe fn batch<'t, W: Walker<'t>, const ANY: bool, const FETCH: bool>(
+                tree: &'t Tree,
                 walker: &mut W,
                 count: usize,
                 flight: &mut Flight,
@@ -75,19 +54,6 @@ macro_rules! compile {
                 unsafe {
                     walks::batch::<$lanes, W, ANY, FETCH>(tree, walker, count, flight, counts)
                 }
-            }
-
-            /// # Safety
-            /// As for the walk itself.
-            #[target_feature(enable = $features)]
-            pub(super) unsafe fn single<W: Walker, const ANY: bool>(
-                tree: &Tree,
-                walker: &mut W,
-                flight: &mut Flight,
-                counts: &mut Counts,
-            ) {
-                // SAFETY: the caller's word.
-                unsafe { walks::single::<$lanes, W, ANY>(tree, walker, flight, counts) }
             }
         }
     };

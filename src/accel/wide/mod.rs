@@ -30,24 +30,34 @@ use std::path::Path;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::triangle::Shear;
 use super::{Build, CacheUse, Counts};
 use crate::shape::Bounds;
 use huge::Huge;
-use node::{BLOCK, Block, Node};
-use state::State;
+use node::{Block, Node};
+use state::Flight;
 
 pub use kernel::Kernel;
-pub(super) use state::{Best, Flight, Place, Start};
+pub(super) use state::{Best, Place, Start, Visit};
 
 /// Who walks: where rays come from, who meets items that are no triangles, and where hits go.
-pub(super) trait Walker {
-    /// The ray with this index.
+pub(super) trait Walker<'t> {
+    /// The ray with this index, and the best that is known of it.
     fn start(&self, ray: usize) -> Start;
-    /// Meets one of the items that are no triangles; what is better than the best so far.
-    fn other(&mut self, ray: usize, item: u32, best: Best) -> Option<Best>;
-    /// The ray has been walked; with u and v where the best hit is a triangle of this tree.
-    fn end(&mut self, ray: usize, best: Best, uv: (f32, f32));
+    /// Meets one of the items that are no triangles, of the tree that the ray is in.
+    fn other(&mut self, visit: &Visit, item: u32) -> Met<'t>;
+    /// A triangle, of the world's tree or in an instance, is the best so far; with its u and v.
+    fn found(&mut self, ray: usize, instance: u32, best: Best, uv: (f32, f32));
+}
+
+/// What a ray meets in an item that is no triangle.
+#[derive(Debug)]
+pub(super) enum Met<'t> {
+    /// Nothing.
+    Nothing,
+    /// What is better than the best so far.
+    Better(Best),
+    /// Another tree, which is walked before the rest of this one; only from the tree in which the walk began.
+    Instance(&'t Tree, Start),
 }
 
 /// The items that a tree is built over.
@@ -116,58 +126,28 @@ impl Tree {
         size_of_val(&*self.nodes) + size_of_val(&*self.blocks)
     }
 
-    /// Room for walks of many rays through this tree.
-    pub(super) fn flight(&self, rays: usize) -> Flight {
-        Flight::new(rays.min(batch::IN_FLIGHT), self.levels)
-    }
-
-    /// Walks `count` rays, all at once.
-    pub(super) fn batch<W: Walker, const ANY: bool>(
-        &self,
+    /// Walks `count` rays, all at once, through this tree, and through inner trees of at most so many levels.
+    /// `fetch` asks for memory ahead.
+    pub(super) fn batch<'t, W: Walker<'t>, const ANY: bool>(
+        &'t self,
         kernel: Kernel,
+        (inner_levels, fetch): (usize, bool),
         walker: &mut W,
         count: usize,
         counts: &mut Counts,
     ) {
-        let flight = &mut self.flight(count);
-        // Fetching ahead costs a tenth where the tree is in the cache anyway.
-        if self.bytes() > CACHED {
+        let levels = self.levels + 1 + inner_levels;
+        let flight = &mut Flight::new(count.min(batch::IN_FLIGHT), levels);
+        if fetch {
             compiled::batch::<W, ANY, true>(kernel, self, walker, count, flight, counts);
         } else {
             compiled::batch::<W, ANY, false>(kernel, self, walker, count, flight, counts);
         }
     }
-
-    /// Walks one ray, the walker's first. The flight was made for at least as many levels.
-    pub(super) fn single<W: Walker, const ANY: bool>(
-        &self,
-        kernel: Kernel,
-        walker: &mut W,
-        flight: &mut Flight,
-        counts: &mut Counts,
-    ) {
-        compiled::single::<W, ANY>(kernel, self, walker, flight, counts);
-    }
-
-    /// Hands a ray that has been walked back to the walker.
-    #[inline(always)]
-    fn end<W: Walker, const ANY: bool>(&self, walker: &mut W, ray: &State) {
-        let best = ray.best();
-        let mut uv = (0.0, 0.0);
-        if !ANY && best.is_inside() {
-            let block = &self.blocks[ray.place as usize / BLOCK];
-            let corners = block.triangle(ray.place as usize % BLOCK);
-            uv = Shear::barycentric(ray.shear().edges(corners));
-        }
-        walker.end(ray.ray as usize, best, uv);
-    }
 }
 
 /// Trees over fewer items are built as soon as they are found.
 const WORTH_KEEPING: u32 = 10_000;
-
-/// Trees up to this size are in the caches nearest to a core, as far as counts.
-const CACHED: usize = 16 << 20;
 
 #[cfg(test)]
 mod build_tests;

@@ -25,11 +25,15 @@ pub(super) fn entry(distance: f32, reference: u32) -> Entry {
 
 /// At the bottom of a stack: always within reach.
 pub(super) const BOTTOM: Entry = (f32::NEG_INFINITY.to_bits() as u64) << 32 | DONE as u64;
+/// Below what an instance leaves on the stack.
+pub(super) const EXIT: Entry = (f32::NEG_INFINITY.to_bits() as u64) << 32 | LEAVE as u64;
 
 /// Names a block rather than a node.
 pub(super) const LEAF: u32 = 1 << 31;
 /// With [`LEAF`]: names an item that is no triangle.
 pub(super) const OTHER: u32 = LEAF | 1 << 30;
+/// Nothing is left to be visited in the instance that the ray is in.
+pub(super) const LEAVE: u32 = DONE - 1;
 /// Nothing is left to be visited.
 pub(super) const DONE: u32 = u32::MAX;
 const COUNT_SHIFT: u32 = 28;

@@ -2,23 +2,43 @@
 //! of rays have their stacks.
 
 use std::hint::select_unpredictable;
+use std::ptr::null;
 
 use glam::Vec3;
 
-use super::node::{BOTTOM, DONE, Entry, WIDTH, entry};
+use super::Tree;
+use super::node::{BOTTOM, Block, DONE, Entry, Node, WIDTH, entry};
 use crate::accel::boxes::RayBoxes;
 use crate::accel::triangle::Shear;
-use crate::interaction::Ray;
+use crate::interaction::{Hit, Ray};
 
 /// What a walk begins with.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::accel) struct Start {
     /// In the tree's space.
     pub(in crate::accel) ray: Ray,
-    /// Where the ray enters the instance that the tree stands in; 0 in the world.
+    /// The instance that the tree stands in, or [`Hit::NONE`].
+    pub(in crate::accel) instance: u32,
+    /// Where the ray enters it; 0 in the world.
     pub(in crate::accel) entry: f32,
     /// What is known already.
     pub(in crate::accel) best: Best,
+}
+
+/// A ray that has come to an item that is no triangle.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::accel) struct Visit {
+    /// Its place in its batch.
+    pub(in crate::accel) ray: usize,
+    /// The instance that it is in, or [`Hit::NONE`].
+    pub(in crate::accel) instance: u32,
+    /// Where it entered that.
+    pub(in crate::accel) entry: f32,
+    pub(in crate::accel) best: Best,
+    /// In the space of the tree that the ray is in.
+    pub(in crate::accel) boxes: RayBoxes,
+    /// Likewise.
+    pub(in crate::accel) shear: Shear,
 }
 
 /// The best hit so far.
@@ -52,6 +72,8 @@ impl Place {
 }
 
 /// A ray on its way. The first cache line is what a node needs, the second what a block needs.
+///
+/// `nodes` and `blocks` are those of the tree that the ray is in, and live as long as the walk.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(super) struct State {
@@ -65,10 +87,12 @@ pub(super) struct State {
     pub(super) octant: u8,
     /// The greatest entry that is within reach: the distance beyond which nothing counts, and ones.
     pub(super) bound: Entry,
+    pub(super) nodes: *const Node,
     /// What to visit.
     pub(super) current: u32,
     /// The first free place on the stack.
     pub(super) top: u32,
+    pub(super) blocks: *const Block,
     pub(super) place: u32,
     pub(super) id: u32,
     pub(super) origin: [f32; 3],
@@ -81,6 +105,7 @@ pub(super) struct State {
     /// Lanes of the block under way whose triangles the ray goes through.
     pub(super) lanes: u8,
     pub(super) entry: f32,
+    pub(super) instance: u32,
     /// The ray's place in its batch.
     pub(super) ray: u32,
 }
@@ -109,8 +134,10 @@ impl State {
         near: [0, NODE_AXIS, 2 * NODE_AXIS],
         octant: 0,
         bound: BOTTOM,
+        nodes: null(),
         current: DONE,
         top: 0,
+        blocks: null(),
         place: 0,
         id: 0,
         origin: [0.0; 3],
@@ -120,12 +147,21 @@ impl State {
         axes: [0, BLOCK_AXIS, 2 * BLOCK_AXIS],
         lanes: 0,
         entry: 0.0,
+        instance: Hit::NONE,
         ray: 0,
     };
 
-    /// Puts a ray at the root; `bottom` is its stack's.
+    /// Begins with a ray at a tree's root; `bottom` is its stack's.
     #[inline(always)]
-    pub(super) fn begin(&mut self, ray: u32, start: &Start, bottom: u32) {
+    pub(super) fn begin(&mut self, ray: u32, tree: &Tree, start: &Start, bottom: u32) {
+        self.enter(tree, start);
+        self.top = bottom + SENTINELS as u32;
+        self.ray = ray;
+    }
+
+    /// Puts the ray at the root of a tree; its stack stays.
+    #[inline(always)]
+    pub(super) fn enter(&mut self, tree: &Tree, start: &Start) {
         let (boxes, shear) = (RayBoxes::new(&start.ray), Shear::new(&start.ray));
         let origin = start.ray.origin.to_array();
         // A ray that is not finite meets nothing, and its comparisons would go any way.
@@ -143,15 +179,16 @@ impl State {
             self.axes[axis] = shear.axes[axis] as u8 * BLOCK_AXIS;
         }
         self.reach(select_unpredictable(sound, start.best.t, f32::NEG_INFINITY));
+        self.nodes = tree.nodes.as_ptr();
+        self.blocks = tree.blocks.as_ptr();
         self.current = 0;
-        self.top = bottom + SENTINELS as u32;
         self.place = start.best.place.0;
         self.id = start.best.id;
         self.origin = origin;
         self.direction = start.ray.direction.to_array();
         self.shear = shear.shear;
         self.entry = start.entry;
-        self.ray = ray;
+        self.instance = start.instance;
     }
 
     /// The distance beyond which nothing counts.
@@ -172,6 +209,19 @@ impl State {
             t: self.limit(),
             id: self.id,
             place: Place(self.place),
+        }
+    }
+
+    /// What a walker is told.
+    #[inline(always)]
+    pub(super) fn visit(&self) -> Visit {
+        Visit {
+            ray: self.ray as usize,
+            instance: self.instance,
+            entry: self.entry,
+            best: self.best(),
+            boxes: self.boxes(),
+            shear: self.shear(),
         }
     }
 

@@ -7,6 +7,7 @@ use glam::Vec3;
 use super::kernel::{Ends, FILED, Lanes};
 use super::node::{BOTTOM, DONE, Entry, LEAF, OTHER, WIDTH, entry};
 use super::portable::Portable;
+use super::state::State;
 use super::*;
 use crate::interaction::Ray;
 use crate::math::random;
@@ -35,6 +36,7 @@ fn ray(i: u32) -> State {
             t_max: 1.0,
             time: 0.0,
         },
+        instance: 0,
         entry: number(3, i).max(0.0),
         best: Best {
             t: 1.0 + number(4, i),
@@ -43,7 +45,7 @@ fn ray(i: u32) -> State {
         },
     };
     let mut state = State::IDLE;
-    state.begin(0, &start, 0);
+    state.begin(0, &Tree::default(), &start, 0);
     state.lanes = random::bits(5, i) as u8 & 15;
     state
 }
