@@ -74,11 +74,11 @@ impl Build {
     }
 }
 
-/// From how many rays a primitive on more work has paid for itself: medium costs 0.12 µs a triangle more than
-/// fast and saves 1 % of a ray, slow 1.6 µs and 2.5 %.
-const MEDIUM_PAYS: u64 = 150;
+/// From how many rays a primitive on more work has paid for itself: medium costs 0.1 µs a triangle more than
+/// fast and saves half a percent of a ray, slow 0.5 µs and 2 %.
+const MEDIUM_PAYS: u64 = 200;
 /// See `MEDIUM_PAYS`.
-const SLOW_PAYS: u64 = 800;
+const SLOW_PAYS: u64 = 400;
 
 /// How a tracer is made.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
