@@ -2,13 +2,13 @@
 //! that swaps or a process that is killed. The film's share is exact; meshes are estimated by what their
 //! files announce and then known; trees go by the number of primitives.
 
-use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
 use super::blocks::Grid;
 use crate::description::{Canonical, Description, Part};
 use crate::error::{Error, Result};
+use crate::mesh;
 use crate::sensor::Film;
 
 /// Bytes of a tree for a primitive while it is built, as measured with obvhs 0.4: boxes, sort keys, two
@@ -100,15 +100,21 @@ impl Estimate {
 
 /// Bytes and primitives of a mesh or image file, as far as its head and its length tell.
 fn of_file(path: &Path) -> Option<(u64, u64)> {
-    let file = File::open(path).ok()?;
-    let length = file.metadata().ok()?.len();
-    let extension = path.extension()?.to_str()?.to_lowercase();
-    Some(match extension.as_str() {
+    let length = path.metadata().ok()?.len();
+    // What deflate can make of a byte at most, and what it makes of meshes.
+    let (most, likely) = if mesh::is_compressed(path) {
+        (1032, 3)
+    } else {
+        (1, 1)
+    };
+    let (most, length) = (length.saturating_mul(most), length.saturating_mul(likely));
+    Some(match mesh::extension(path).as_str() {
         "ply" => {
-            let (vertices, faces) = ply_counts(file);
+            let (vertices, faces) = ply_counts(path);
             // No vertex and no face takes less than two bytes of the file, whatever its head says.
-            let (vertices, faces) = (vertices.min(length / 2), faces.min(length / 2));
-            (vertices * VERTEX + faces * TRIANGLE, faces)
+            let (vertices, faces) = (vertices.min(most / 2), faces.min(most / 2));
+            let bytes = vertices.saturating_mul(VERTEX);
+            (bytes.saturating_add(faces.saturating_mul(TRIANGLE)), faces)
         }
         // A line of an OBJ file has about 30 bytes; triangles are about half of them.
         "obj" => (length, length / 60),
@@ -123,10 +129,13 @@ fn of_file(path: &Path) -> Option<(u64, u64)> {
 }
 
 /// Vertices and faces as the head of a PLY file announces them.
-fn ply_counts(file: File) -> (u64, u64) {
+fn ply_counts(path: &Path) -> (u64, u64) {
     const HEAD: u64 = 1 << 16;
     let mut counts = (0, 0);
-    for line in BufReader::new(file.take(HEAD)).split(b'\n') {
+    let Ok(contents) = mesh::contents(path) else {
+        return counts;
+    };
+    for line in BufReader::new(contents.take(HEAD)).split(b'\n') {
         let Ok(line) = line else { break };
         let line = String::from_utf8_lossy(&line);
         let words: Vec<&str> = line.split_whitespace().collect();
