@@ -18,6 +18,20 @@ const TREE: u64 = 300;
 const VERTEX: u64 = 32;
 const TRIANGLE: u64 = 12;
 
+/// Refuses a mesh file that announces more than can be read and rendered within the limit, before it is read.
+///
+/// # Errors
+/// Says what it would take.
+pub fn check_mesh(path: &Path, limit: Option<u64>) -> Result<()> {
+    let (assets, primitives) = of_file(path).unwrap_or_default();
+    let estimate = Estimate {
+        film: 0,
+        assets,
+        trees: trees(primitives),
+    };
+    estimate.check(limit)
+}
+
 /// What a render takes, in bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Estimate {
@@ -53,11 +67,13 @@ impl Estimate {
         files.sort();
         files.dedup();
         let mut estimate = Self::default();
+        let mut primitives = 0_u64;
         for path in files {
-            let (assets, primitives) = of_file(&path).unwrap_or_default();
+            let (assets, of_this) = of_file(&path).unwrap_or_default();
             estimate.assets = estimate.assets.saturating_add(assets);
-            estimate.trees = estimate.trees.saturating_add(trees(primitives));
+            primitives = primitives.saturating_add(of_this);
         }
+        estimate.trees = trees(primitives);
         estimate
     }
 
@@ -118,10 +134,12 @@ fn of_file(path: &Path) -> Option<(u64, u64)> {
         }
         // A line of an OBJ file has about 30 bytes; triangles are about half of them.
         "obj" => (length, length / 60),
-        // Compressed to about a third.
-        "serialized" => (length.saturating_mul(3), length / 20),
-        "stl" => (length, length / 50),
-        "gltf" | "glb" => (length, length / 30),
+        // Compressed to about a third. It is in memory beside what is read from it, as is that of the next ones.
+        "serialized" => (length.saturating_mul(4), length / 20),
+        // With a table of the vertices.
+        "stl" => (length.saturating_mul(2), length / 50),
+        // With each of its arrays, and a mesh for each of its parts.
+        "gltf" | "glb" => (length.saturating_mul(7) / 2, length / 30),
         // Compressed to about a fifth, and held as numbers.
         "png" | "jpg" | "jpeg" => (length.saturating_mul(20), 0),
         _ => (length, 0),
@@ -164,6 +182,8 @@ pub fn human_bytes(bytes: u64) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::io::Write;
+
     use super::*;
 
     #[test]
@@ -199,6 +219,25 @@ mod tests {
         let (bytes, primitives) = of_file(&path).unwrap();
         assert_eq!(primitives, head.len() as u64 / 2);
         assert!(bytes < 1000);
+    }
+
+    #[test]
+    fn a_mesh_that_announces_too_much_is_refused_unread_compressed_or_not() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut ply = b"ply\nelement vertex 100000\nelement face 200000\nend_header\n".to_vec();
+        ply.resize(1 << 20, b' ');
+        let plain = folder.path().join("a.ply");
+        std::fs::write(&plain, &ply).unwrap();
+        let mut gzip = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+        gzip.write_all(&ply).unwrap();
+        let compressed = folder.path().join("a.ply.gz");
+        std::fs::write(&compressed, gzip.finish().unwrap()).unwrap();
+        for path in [plain, compressed] {
+            check_mesh(&path, None).unwrap();
+            check_mesh(&path, Some(200_000_000)).unwrap();
+            let error = check_mesh(&path, Some(10_000_000)).unwrap_err().to_string();
+            assert!(error.contains("more than the limit of 10.0 MB"), "{error}");
+        }
     }
 
     #[test]
