@@ -354,7 +354,7 @@ fn a_shared_scene_hides_no_mistake_of_a_view() {
 fn what_does_not_fit_into_memory_is_refused_before_anything_is_loaded() {
     let place = Place::new();
     let watch = Watch::default();
-    for (size, limit, part) in [((4000, 4000), 600_000_000, "--crop"), ((8, 8), 5_000, "")] {
+    for (size, limit, part) in [((4000, 4000), 600_000_000, "--crop"), ((8, 8), 4_700, "")] {
         let mut scene = place.scene(SCENE);
         let overrides = Overrides {
             size: Some(size),
