@@ -55,8 +55,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
 }
 
 fn info(arguments: &Arguments, input: &Path) -> Result<Value> {
-    let extension = input.extension().unwrap_or_default().to_string_lossy();
-    let extension = extension.to_lowercase();
+    let extension = mesh::extension(input);
     let is_mesh = mesh::FORMATS
         .iter()
         .any(|format| format.extensions.contains(&extension.as_str()));

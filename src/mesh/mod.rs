@@ -27,7 +27,8 @@ use rayon::prelude::*;
 pub use generate::{bumpy_sphere, cube, grid, hair, rectangle, sphere, terrain};
 pub use gltf::{GltfCamera, GltfPart, GltfScene, Projection, read_gltf};
 pub use mtl::BARE_COLOR;
-pub use read::{FORMATS, Format, Loaded, MeshFile, ReadMesh, ReadOptions, read};
+pub use read::{FORMATS, Format, Loaded, MeshFile, ReadMesh, ReadOptions, extension, read};
+pub(crate) use read::{contents, is_compressed};
 
 /// Triangles over shared vertices.
 #[derive(Clone, Debug, Default, PartialEq)]

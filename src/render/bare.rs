@@ -8,7 +8,8 @@ use glam::{DMat4, DVec3, Vec3};
 use crate::description::{Description, Options};
 use crate::error::{Error, Result};
 use crate::mesh::{
-    BARE_COLOR, GltfCamera, Mesh, MeshFile, Projection, ReadMesh, ReadOptions, read, read_gltf,
+    BARE_COLOR, GltfCamera, Mesh, MeshFile, Projection, ReadMesh, ReadOptions, extension, read,
+    read_gltf,
 };
 
 /// Which way is up in a mesh file.
@@ -36,7 +37,7 @@ fn plugin(path: &Path) -> Option<&'static str> {
         ("gltf", "gltf"),
         ("glb", "gltf"),
     ];
-    let extension = path.extension()?.to_str()?.to_lowercase();
+    let extension = extension(path);
     PLUGINS
         .iter()
         .find_map(|(e, plugin)| (*e == extension).then_some(*plugin))
