@@ -5,6 +5,7 @@
 
 mod attributes;
 mod header;
+mod write;
 
 use glam::{Vec2, Vec3};
 
@@ -14,6 +15,8 @@ use super::{Attribute, Mesh, Per};
 use crate::error::Result;
 use attributes::Plan;
 use header::{Element, Encoding, Header, Kind, Scalar};
+
+pub use write::{check_writable, write_ply, write_text};
 
 /// Rows that are written out at a time where they are not of fixed size.
 const ROWS: u64 = 1 << 10;
