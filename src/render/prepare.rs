@@ -146,11 +146,17 @@ pub(super) fn view<C: ColorModel>(description: &Description, sensor: NodeId) -> 
     })
 }
 
-/// Loads the shapes.
-pub(super) fn load(description: &Description, progress: &dyn Progress) -> Result<Assets> {
+/// Loads the shapes, and displaces those that want it as far as the `limit` on bytes allows.
+pub(super) fn load(
+    description: &Description,
+    limit: Option<u64>,
+    progress: &dyn Progress,
+) -> Result<Assets> {
     let shapes = description.root().children(Kind::Shape).len();
     progress.begin(Phase::Load, shapes as u64);
-    Assets::load(description, &|| progress.advance(1, 0))
+    let mut assets = Assets::load(description, &|| progress.advance(1, 0))?;
+    assets.displace(description, limit.map(memory::triangles))?;
+    Ok(assets)
 }
 
 /// What the view says of the work to come.
@@ -184,7 +190,11 @@ fn make<C: ColorModel>(
         ..Estimate::of_files(description)
     };
     announced.check(options.memory_limit)?;
-    let assets = timed(&mut seconds.load, || load(description, progress)).map_err(|error| {
+    let assets = timed(&mut seconds.load, || {
+        let limit = options.memory_limit.map(|limit| limit.saturating_sub(film));
+        load(description, limit, progress)
+    })
+    .map_err(|error| {
         // What is wrong with materials is told along with what is wrong with shapes.
         let mut problems = Problems::default();
         problems.push(error);

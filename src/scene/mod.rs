@@ -4,6 +4,7 @@
 mod assets;
 mod build;
 mod choice;
+mod displacement;
 
 use glam::{Vec2, Vec3};
 

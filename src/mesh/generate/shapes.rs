@@ -62,7 +62,7 @@ pub fn add_bumps(mesh: &mut Mesh, bumps: &Bumps) {
     let noise = Noise::new(bumps.seed, bumps.octaves);
     let (height, width) = (bumps.height * diagonal, bumps.width * diagonal);
     let place = |p: Vec3| (p - low).as_dvec3() / width;
-    mesh.displace(|mesh, vertex| height * noise.at(place(mesh.positions[vertex])));
+    mesh.displace(|mesh, vertex| Some(height * noise.at(place(mesh.positions[vertex]))));
 }
 
 #[cfg(test)]
