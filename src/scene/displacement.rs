@@ -30,6 +30,9 @@ const OWN: [&str; 4] = [
 /// Edges along the diagonal of a shape's box.
 const FINENESS: f32 = 256.0;
 
+/// Triangles that are made where nobody says how much memory there is.
+const MOST: u64 = 1 << 26;
+
 /// How a shape is displaced.
 struct Displacement<'a> {
     properties: Properties<'a>,
@@ -41,10 +44,11 @@ struct Displacement<'a> {
 }
 
 impl Assets {
-    /// Moves the surfaces of shapes with a displacement. `most` is how many triangles there is room for, all shapes together.
+    /// Moves the surfaces of shapes with a displacement. `most` is how many triangles there is room for, all shapes
+    /// together; 2²⁶ where that is not known.
     pub fn displace(&mut self, description: &Description, most: Option<u64>) -> Result<()> {
         let palette = Palette::new(Mono).with_role(Role::Quantity);
-        let most = usize::try_from(most.unwrap_or(u64::MAX)).unwrap_or(usize::MAX);
+        let most = usize::try_from(most.unwrap_or(MOST)).unwrap_or(usize::MAX);
         let mut left = most.saturating_sub(self.primitive_count() as usize);
         let mut problems = Problems::default();
         for member in &mut self.shapes {
