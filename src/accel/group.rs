@@ -4,6 +4,7 @@
 use std::sync::Arc;
 
 use glam::Vec3;
+use rayon::prelude::*;
 
 use crate::shape::{Bounds, Geometry};
 
@@ -84,22 +85,133 @@ impl Shapes {
     pub(super) fn iter(&self) -> impl Iterator<Item = &Geometry> {
         self.shapes.iter().map(|shape| &**shape)
     }
+
+    pub(super) fn primitive_count(&self) -> usize {
+        self.iter().map(|s| s.primitive_count() as usize).sum()
+    }
 }
 
-/// What a tree is built over.
-struct Members<'a> {
-    items: &'a [Item],
+/// What a group's tree is built over: items with finite boxes, numbered through. They are never listed one by one,
+/// for there may be tens of millions.
+pub(super) struct Members<'a> {
     shapes: &'a Shapes,
+    /// The boxes of instances.
+    instances: &'a [Bounds],
+    runs: Vec<Run>,
+    count: u32,
+    /// Items that have no finite box.
+    unbounded: Vec<Item>,
+}
+
+/// Items whose indices follow one another.
+struct Run {
+    /// The number of the first item.
+    start: u32,
+    first: Item,
+}
+
+/// Items whose boxes one task joins.
+const GRAIN: u32 = 1 << 14;
+
+impl<'a> Members<'a> {
+    /// The primitives of some `shapes`, and all `instances` in their boxes.
+    pub(super) fn new(all: &'a Shapes, shapes: &[u32], instances: &'a [Bounds]) -> Self {
+        let mut members = Self {
+            shapes: all,
+            instances,
+            runs: Vec::new(),
+            count: 0,
+            unbounded: Vec::new(),
+        };
+        for &shape in shapes {
+            let geometry = all.get(shape);
+            let (first, count) = (Item::primitive(shape, 0), geometry.primitive_count());
+            match geometry {
+                // All triangles are finite.
+                Geometry::Mesh(_) => members.push(first, count),
+                _ => members.sift(first, count),
+            }
+        }
+        members.sift(Item::instance(0), instances.len() as u32);
+        members
+    }
+
+    /// Takes `count` items from `first` on.
+    fn push(&mut self, first: Item, count: u32) {
+        if count == 0 {
+            return;
+        }
+        let start = self.count;
+        let goes_on = (self.runs.last()).is_some_and(|last| last.item(start) == first);
+        if !goes_on {
+            self.runs.push(Run { start, first });
+        }
+        self.count = start
+            .checked_add(count)
+            .expect("fewer than 2³² items fit into memory");
+    }
+
+    /// Takes those items of `count` from `first` on that have a finite box.
+    fn sift(&mut self, first: Item, count: u32) {
+        for item in (first.index..count).map(|index| Item { index, ..first }) {
+            let bounds = self.bounds_of(item);
+            if bounds.is_unbounded() {
+                self.unbounded.push(item);
+            } else if !bounds.is_empty() {
+                self.push(item, 1);
+            }
+        }
+    }
+
+    fn item(&self, number: u32) -> Item {
+        let run = self.runs.partition_point(|run| run.start <= number) - 1;
+        self.runs[run].item(number)
+    }
+
+    fn bounds_of(&self, item: Item) -> Bounds {
+        match item.as_instance() {
+            Some(instance) => self.instances[instance as usize],
+            None => self.shapes.get(item.shape).bounds(item.index),
+        }
+    }
+
+    /// A box around all items.
+    fn union(&self) -> Bounds {
+        let parts = (0..self.count.div_ceil(GRAIN)).into_par_iter().map(|part| {
+            let end = self.count.min((part + 1).saturating_mul(GRAIN));
+            let boxes = (part * GRAIN..end).map(|item| self.bounds(item));
+            boxes.fold(Bounds::EMPTY, Bounds::union)
+        });
+        parts.reduce(|| Bounds::EMPTY, Bounds::union)
+    }
+}
+
+impl Run {
+    fn item(&self, number: u32) -> Item {
+        let index = self.first.index + (number - self.start);
+        Item {
+            index,
+            ..self.first
+        }
+    }
 }
 
 impl Leaves for Members<'_> {
+    fn count(&self) -> u32 {
+        self.count
+    }
+
+    fn bounds(&self, item: u32) -> Bounds {
+        self.bounds_of(self.item(item))
+    }
+
     fn is_triangle(&self, item: u32) -> bool {
-        let item = self.items[item as usize];
+        let item = self.item(item);
         item.as_instance().is_none() && matches!(self.shapes.get(item.shape), Geometry::Mesh(_))
     }
 
     fn triangle(&self, item: u32) -> (u32, [Vec3; 3]) {
-        let item = self.items[item as usize];
+        let item = self.item(item);
         match self.shapes.get(item.shape) {
             Geometry::Mesh(mesh) => (self.shapes.number(item), mesh.corners(item.index)),
             _ => unreachable!("the tree has asked whether it is a triangle"),
@@ -118,37 +230,15 @@ pub(super) struct Group {
 }
 
 impl Group {
-    /// A group of items in their boxes.
-    pub(super) fn new(
-        placed: impl Iterator<Item = (Item, Bounds)>,
-        recipe: Recipe,
-        shapes: &Shapes,
-    ) -> Self {
-        let is_finite = |b: &Bounds| b.min.is_finite() && b.max.is_finite();
-        let mut unbounded = Vec::new();
-        let (mut items, mut boxes) = (Vec::new(), Vec::new());
-        for (item, bounds) in placed.filter(|(_, bounds)| !bounds.is_empty()) {
-            if is_finite(&bounds) {
-                items.push(item);
-                boxes.push(bounds);
-            } else {
-                unbounded.push(item);
-            }
-        }
-        let bounds = boxes.iter().copied().fold(Bounds::EMPTY, Bounds::union);
-        let mut tree = Tree::default();
-        if recipe.method == Method::Tree {
-            let others;
-            let members = Members {
-                items: &items,
-                shapes,
-            };
-            (tree, others) = Tree::build(&boxes, &members, recipe.build);
-            items = others.into_iter().map(|i| items[i as usize]).collect();
-        }
+    pub(super) fn new(members: Members<'_>, recipe: Recipe) -> Self {
+        let bounds = members.union();
+        let (tree, items) = match recipe.method {
+            Method::Tree => Tree::build(&members, recipe.build),
+            Method::Brute => (Tree::default(), (0..members.count).collect()),
+        };
         Self {
-            unbounded,
-            items,
+            items: items.into_iter().map(|item| members.item(item)).collect(),
+            unbounded: members.unbounded,
             tree,
             bounds,
         }

@@ -17,7 +17,7 @@ use crate::interaction::{Hit, Interaction, Ray};
 use crate::math::Transform;
 use crate::shape::{Bounds, Geometry};
 
-use group::{Group, Item, Shapes};
+use group::{Group, Members, Shapes};
 use walk::Walk;
 
 pub use wide::Kernel;
@@ -134,20 +134,12 @@ impl Tracer {
             .max()
             .unwrap_or(0);
         let shapes = Shapes::new(shapes);
-        let members = |group: u32| {
-            let shapes = shapes
-                .iter()
-                .zip(group_of)
-                .enumerate()
-                .filter(move |(_, (_, g))| **g == group);
-            shapes.flat_map(|(i, (shape, _))| {
-                (0..shape.primitive_count())
-                    .map(move |p| (Item::primitive(i as u32, p), shape.bounds(p)))
-            })
-        };
-        let mut groups: Vec<Group> = (1..count)
-            .map(|g| Group::new(members(g), recipe, &shapes))
-            .collect();
+        let mut shapes_of = vec![Vec::new(); count as usize];
+        for (shape, group) in (0..).zip(group_of) {
+            shapes_of[*group as usize].push(shape);
+        }
+        let group = |of: &Vec<u32>| Group::new(Members::new(&shapes, of, &[]), recipe);
+        let mut groups: Vec<Group> = shapes_of[1..].iter().map(group).collect();
         let instance_bounds: Vec<Bounds> = (instances.iter())
             .map(|instance| {
                 let group = &groups[instance.group as usize - 1];
@@ -158,10 +150,8 @@ impl Tracer {
                 }
             })
             .collect();
-        let placed = (0..)
-            .map(Item::instance)
-            .zip(instance_bounds.iter().copied());
-        let world = Group::new(members(0).chain(placed), recipe, &shapes);
+        let world = Members::new(&shapes, &shapes_of[0], &instance_bounds);
+        let world = Group::new(world, recipe);
         groups.insert(0, world);
         Self {
             shapes,
@@ -212,10 +202,7 @@ impl Tracer {
 
     /// Primitives, each instance's counted once.
     pub fn primitive_count(&self) -> usize {
-        self.shapes
-            .iter()
-            .map(|s| s.primitive_count() as usize)
-            .sum()
+        self.shapes.primitive_count()
     }
 
     /// How many instances there are.

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use etendue::description::{Description, NodeId};
 use etendue::error::{Error, Result};
+use etendue::render::Session;
 
 use super::output::Names;
 use super::parse::Frames;
@@ -121,7 +122,9 @@ impl Request<'_> {
             return Ok(vec![(0, String::new())]);
         }
         let frame = self.numbers()[0];
-        let description = self.scene.describe(input, &self.scene.options(frame))?;
+        let description =
+            self.scene
+                .describe(input, &self.scene.options(frame), &mut Session::default())?;
         let names = names(&description);
         let all = names.iter().cloned().enumerate();
         Ok(match self.sensors {

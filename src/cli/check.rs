@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use etendue::error::{Problem, Result};
-use etendue::render::{self, Options, Silent};
+use etendue::render::{self, Options, Session, Silent};
 use serde_json::json;
 
 use super::scene::SceneArguments;
@@ -70,6 +70,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
 /// The warnings.
 fn check(arguments: &Arguments, input: &Path) -> Result<Vec<Problem>> {
     let scene = &arguments.scene;
-    let description = scene.describe(input, &scene.options(None))?;
+    let description = scene.describe(input, &scene.options(None), &mut Session::default())?;
     render::check(&description, &Options::default(), &Silent)
 }

@@ -55,8 +55,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
 }
 
 fn info(arguments: &Arguments, input: &Path) -> Result<Value> {
-    let extension = input.extension().unwrap_or_default().to_string_lossy();
-    let extension = extension.to_lowercase();
+    let extension = mesh::extension(input);
     let is_mesh = mesh::FORMATS
         .iter()
         .any(|format| format.extensions.contains(&extension.as_str()));
@@ -71,8 +70,9 @@ fn info(arguments: &Arguments, input: &Path) -> Result<Value> {
 
 fn scene(arguments: &Arguments, input: &Path) -> Result<Value> {
     let scene = &arguments.scene;
-    let description = scene.describe(input, &scene.options(None))?;
-    let info = Session::default().info(&description, &Options::default(), &Silent)?;
+    let mut session = Session::default();
+    let description = scene.describe(input, &scene.options(None), &mut session)?;
+    let info = session.info(&description, &Options::default(), &Silent)?;
     if !arguments.quiet {
         report::warnings(&info.warnings);
     }

@@ -10,7 +10,7 @@ use etendue::description::{self, Description, Value};
 use etendue::display;
 use etendue::error::{Error, Problem, Result};
 use etendue::render::{
-    Adaptive, Checkpoint, Colors, Options, Overrides, Rendered, Session, is_mesh,
+    self, Adaptive, Checkpoint, Colors, Options, Overrides, Rendered, Session, is_mesh,
 };
 use etendue::sensor::Window;
 use glam::DMat4;
@@ -359,7 +359,10 @@ impl Series<'_> {
         {
             return Ok((options, description));
         }
-        let mut description = scene.describe(&item.input, &options)?;
+        if bare {
+            render::check_mesh(&item.input, self.memory_limit)?;
+        }
+        let mut description = scene.describe(&item.input, &options, &mut self.session)?;
         self.arguments.overrides().apply(&mut description);
         Ok((options, description))
     }

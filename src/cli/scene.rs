@@ -6,7 +6,7 @@ use std::path::Path;
 use clap::{Args, ValueEnum};
 use etendue::description::{Description, Kind, NodeId, Options};
 use etendue::error::{Error, Result};
-use etendue::render::{self, UpAxis};
+use etendue::render::{self, BareMesh, Session, UpAxis};
 
 use super::output::with_frame;
 use super::parse;
@@ -59,14 +59,21 @@ impl SceneArguments {
         }
     }
 
-    /// The scene in the file, or around the mesh in it.
-    pub(super) fn describe(&self, input: &Path, options: &Options) -> Result<Description> {
+    /// The scene in the file, or around the mesh in it; the session has that mesh then.
+    pub(super) fn describe(
+        &self,
+        input: &Path,
+        options: &Options,
+        session: &mut Session,
+    ) -> Result<Description> {
         if render::is_mesh(input) {
             let up = match self.up {
                 Up::Y => UpAxis::Y,
                 Up::Z => UpAxis::Z,
             };
-            return render::describe_mesh(input, up, options);
+            let BareMesh { description, mesh } = render::describe_mesh(input, up, options)?;
+            session.give(mesh);
+            return Ok(description);
         }
         if is_scene(input) {
             return Description::read(input, options);

@@ -38,7 +38,8 @@ pub use gltf::{GltfCamera, GltfPart, GltfScene, Projection, read_gltf};
 pub use mtl::BARE_COLOR;
 pub use parts::{Part, Parts, read_parts};
 pub use ply::{check_writable, write_ply, write_text};
-pub use read::{FORMATS, Format, Loaded, ReadOptions, read};
+pub use read::{FORMATS, Format, Loaded, MeshFile, ReadMesh, ReadOptions, extension, read};
+pub(crate) use read::{contents, is_compressed};
 pub use refine::TooMany;
 pub use report::Report;
 
@@ -188,6 +189,17 @@ impl Mesh {
             + attributes.sum::<usize>()
     }
 
+    /// Gives back memory that the arrays do not need.
+    pub(crate) fn shrink(&mut self) {
+        self.positions.shrink_to_fit();
+        self.normals.shrink_to_fit();
+        self.uvs.shrink_to_fit();
+        self.triangles.shrink_to_fit();
+        for attribute in &mut self.attributes {
+            attribute.values.shrink_to_fit();
+        }
+    }
+
     /// Drops triangles with a corner that is not finite, and mends normals and texture coordinates that are
     /// unusable. The readers have called it; call it again after a transform that may overflow.
     ///
@@ -328,12 +340,10 @@ impl Mesh {
     }
 
     fn mend_uvs(&mut self) -> usize {
-        let mut count = 0;
-        for uv in self.uvs.iter_mut().filter(|uv| !uv.is_finite()) {
-            *uv = Vec2::ZERO;
-            count += 1;
-        }
-        count
+        (self.uvs.par_iter_mut().with_min_len(GRAIN))
+            .filter(|uv| !uv.is_finite())
+            .map(|uv| *uv = Vec2::ZERO)
+            .count()
     }
 
     /// Turns texture coordinates over, `v` → `1 − v`.

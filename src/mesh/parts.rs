@@ -5,7 +5,7 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use super::read::{Decoded, Input, Loaded, ReadOptions, open};
+use super::read::{Decoded, Input, Loaded, ReadOptions, extension, with_input};
 use super::{Attribute, Mesh, Per, gltf, obj, read, serialized};
 use crate::error::{Error, Location, Problem, Result};
 
@@ -37,8 +37,7 @@ const MOST: usize = 1 << 16;
 /// # Errors
 /// As [`read`] has them; where there are more than 65536 parts.
 pub fn read_parts(path: &Path) -> Result<Parts> {
-    let extension = path.extension().unwrap_or_default().to_string_lossy();
-    let parts = match extension.to_lowercase().as_str() {
+    let parts = match extension(path).as_str() {
         "gltf" | "glb" => gltf_parts(path)?,
         "obj" => obj_parts(path)?,
         "serialized" => serialized_parts(path)?,
@@ -108,14 +107,8 @@ fn part_color([r, g, b, _]: &[f32; 4], mesh: &Mesh) -> Attribute {
 }
 
 fn serialized_parts(path: &Path) -> Result<Parts> {
-    let file = open(path)?;
-    let input = Input {
-        path,
-        length: file.length,
-        reader: &mut &file.file,
-    };
     let mut parts = Parts::default();
-    for mesh in serialized::read_all(input)? {
+    for mesh in with_input(path, serialized::read_all)? {
         let warnings = Vec::new();
         parts.add(String::new(), Decoded { mesh, warnings }.finish(path));
     }
@@ -125,13 +118,7 @@ fn serialized_parts(path: &Path) -> Result<Parts> {
 fn obj_parts(path: &Path) -> Result<Parts> {
     /// Keeps step with the triangles where some are dropped.
     const PART: &str = "face_part";
-    let file = open(path)?;
-    let bytes = Input {
-        path,
-        length: file.length,
-        reader: &mut &file.file,
-    }
-    .bytes()?;
+    let bytes = with_input(path, |input| input.bytes())?;
     let groups = Groups::of(&bytes);
     let input = Input {
         path,

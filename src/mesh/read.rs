@@ -1,15 +1,18 @@
 //! Reading a mesh file: the table of formats, found by the file's extension, and what is common to all of
-//! them. A format is one file with a function from [`Input`] to [`Mesh`], and one row in [`FORMATS`].
+//! them. A format is one file with a function from [`Input`] to [`Mesh`], and one row in [`FORMATS`]. A file
+//! of any format may be compressed by gzip (`mesh.ply.gz`).
 
 use std::fs::File;
-use std::io::Read;
-use std::path::Path;
+use std::io::{self, BufReader, Read, Seek};
+use std::path::{Path, PathBuf};
+
+use flate2::bufread::MultiGzDecoder;
 
 use super::{Mesh, Repairs, gltf, obj, ply, serialized, stl};
 use crate::error::{Error, Location, Problem, Result};
 
 /// How to read a mesh file; the default is what Mitsuba does without properties.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct ReadOptions {
     /// Whether `v` of a texture coordinate becomes `1 − v`; `None` stands for the format's habit: true
     /// for OBJ, false for all others.
@@ -30,6 +33,24 @@ pub struct Loaded {
     pub dropped_triangles: usize,
     /// What was odd in the file and did not prevent reading it.
     pub warnings: Vec<Problem>,
+}
+
+/// A file, and how it is read: those who agree in both can share a mesh.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct MeshFile {
+    /// Where it is.
+    pub path: PathBuf,
+    /// How it is read.
+    pub options: ReadOptions,
+}
+
+/// A mesh with the file that it comes from.
+#[derive(Clone, Debug)]
+pub struct ReadMesh {
+    /// The file.
+    pub file: MeshFile,
+    /// What is in it.
+    pub loaded: Loaded,
 }
 
 /// A mesh file format.
@@ -70,13 +91,64 @@ pub const FORMATS: &[Format] = &[
 /// Where the file cannot be opened, has an unknown extension or is malformed; the message says where.
 pub fn read(path: &Path, options: &ReadOptions) -> Result<Loaded> {
     let format = format_of(path)?;
+    let decoded = with_input(path, |input| (format.read)(input, options))?;
+    Ok(decoded.finish(path))
+}
+
+/// Does `work` on what is in the file `path`, inflated where it is compressed.
+pub(super) fn with_input<T>(path: &Path, work: impl FnOnce(Input<'_>) -> Result<T>) -> Result<T> {
     let Opened { file, length } = open(path)?;
-    let input = Input {
+    if !is_compressed(path) {
+        return work(Input {
+            path,
+            length,
+            reader: &mut &file,
+        });
+    }
+    let damaged = |e: io::Error| {
+        let message = format!("the compressed file is damaged: {e}");
+        Error::input(message).at(&Location::of_file(path))
+    };
+    // Read once for its length, against which all lengths in it are checked.
+    let length = io::copy(&mut inflate(&file), &mut io::sink()).map_err(damaged)?;
+    let rewound = (&file).rewind();
+    rewound.map_err(|e| Error::system("read", path, &e))?;
+    work(Input {
         path,
         length,
-        reader: &mut &file,
+        reader: &mut inflate(&file),
+    })
+}
+
+/// What is in a mesh file, inflated where it is compressed.
+pub(crate) fn contents(path: &Path) -> io::Result<Box<dyn Read>> {
+    let file = File::open(path)?;
+    if is_compressed(path) {
+        Ok(Box::new(inflate(file)))
+    } else {
+        Ok(Box::new(file))
+    }
+}
+
+fn inflate<R: Read>(file: R) -> MultiGzDecoder<BufReader<R>> {
+    MultiGzDecoder::new(BufReader::with_capacity(1 << 16, file))
+}
+
+/// Whether the file is compressed, by its name.
+pub(crate) fn is_compressed(path: &Path) -> bool {
+    path.extension()
+        .is_some_and(|extension| extension.eq_ignore_ascii_case("gz"))
+}
+
+/// The extension that says a mesh file's format, in lower case: of a compressed file that before `.gz`.
+pub fn extension(path: &Path) -> String {
+    let plain = if is_compressed(path) {
+        path.file_stem().map(Path::new)
+    } else {
+        Some(path)
     };
-    Ok((format.read)(input, options)?.finish(path))
+    let extension = plain.and_then(Path::extension).unwrap_or_default();
+    extension.to_string_lossy().to_lowercase()
 }
 
 /// A regular file.
@@ -108,11 +180,7 @@ pub(super) fn open(path: &Path) -> Result<Opened> {
 }
 
 fn format_of(path: &Path) -> Result<&'static Format> {
-    let extension = path
-        .extension()
-        .unwrap_or_default()
-        .to_string_lossy()
-        .to_lowercase();
+    let extension = extension(path);
     let known = || FORMATS.iter().flat_map(|f| f.extensions.iter().copied());
     FORMATS
         .iter()
@@ -137,7 +205,7 @@ pub(super) struct Input<'a> {
     pub(super) path: &'a Path,
     /// Bytes that `reader` will give.
     pub(super) length: u64,
-    pub(super) reader: &'a mut dyn Read,
+    pub(super) reader: &'a mut (dyn Read + Send),
 }
 
 impl Input<'_> {
@@ -185,6 +253,7 @@ impl Decoded {
                 self.warnings.push(format!("{count} {what}"));
             }
         }
+        self.mesh.shrink();
         if self.mesh.triangles.is_empty() {
             self.warnings.push("the mesh has no triangles".to_owned());
         }

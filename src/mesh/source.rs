@@ -1,8 +1,8 @@
-//! A file read front to back through a small buffer, as lines, words or bytes, so that a mesh is decoded
-//! straight into its arrays and the file is never in memory as a whole. It knows how many bytes are left,
+//! A file read front to back through a buffer, as lines, words or bytes, so that a mesh is decoded straight
+//! into its arrays and the file is never in memory as a whole. It knows how many bytes are left,
 //! which is what lengths in the file are held against, and the line it is on.
 
-use std::io::Read;
+use std::io::{ErrorKind, Read};
 use std::path::Path;
 
 use super::read::Input;
@@ -17,12 +17,14 @@ const LONGEST_WORD: usize = 1 << 10;
 
 pub(super) struct Source<'a> {
     path: &'a Path,
-    reader: &'a mut dyn Read,
+    reader: &'a mut (dyn Read + Send),
     /// Bytes that `reader` has yet to give.
     ahead: u64,
     buffer: Vec<u8>,
     /// Bytes of `buffer` that are used up.
     used: usize,
+    /// Bytes of `buffer` that were read, from its beginning.
+    filled: usize,
     /// Line of the last word or line, from 1; 0 in binary data.
     line: u32,
 }
@@ -35,36 +37,57 @@ impl<'a> Source<'a> {
             ahead: input.length,
             buffer: Vec::new(),
             used: 0,
+            filled: 0,
             line: 1,
         }
     }
 
     /// Bytes from here to the end of the file.
     pub(super) fn remaining(&self) -> u64 {
-        self.ahead + (self.buffer.len() - self.used) as u64
+        self.ahead + (self.filled - self.used) as u64
     }
 
     /// The bytes that follow, at least `wanted` of them unless the file ends.
     pub(super) fn peek(&mut self, wanted: usize) -> Result<&[u8]> {
-        if self.buffer.len() - self.used < wanted && self.ahead > 0 {
-            self.buffer.drain(..self.used);
-            self.used = 0;
-            let room = (wanted.max(BUFFER) - self.buffer.len()) as u64;
-            let asked = room.min(self.ahead);
-            let got = (&mut *self.reader)
-                .take(asked)
-                .read_to_end(&mut self.buffer);
-            let got = got.map_err(|e| Error::system("read", self.path, &e))? as u64;
-            // A file that has shrunk meanwhile ends where it ends now.
-            self.ahead = if got < asked { 0 } else { self.ahead - got };
+        if self.filled - self.used < wanted && self.ahead > 0 {
+            self.fill(wanted.max(BUFFER))?;
         }
-        Ok(&self.buffer[self.used..])
+        Ok(&self.buffer[self.used..self.filled])
+    }
+
+    /// Reads on until `wanted` bytes are there, or the file ends.
+    fn fill(&mut self, wanted: usize) -> Result<()> {
+        self.buffer.copy_within(self.used..self.filled, 0);
+        self.filled -= self.used;
+        self.used = 0;
+        let more = (wanted.saturating_sub(self.filled) as u64).min(self.ahead);
+        // No more than `wanted`, which is in memory's reach.
+        let end = self.filled + more as usize;
+        if self.buffer.len() < end {
+            self.buffer.resize(end, 0);
+        }
+        while self.filled < end {
+            match self.reader.read(&mut self.buffer[self.filled..end]) {
+                // A file that has shrunk meanwhile ends where it ends now.
+                Ok(0) => {
+                    self.ahead = 0;
+                    break;
+                }
+                Ok(count) => {
+                    self.filled += count;
+                    self.ahead -= count as u64;
+                }
+                Err(e) if e.kind() == ErrorKind::Interrupted => {}
+                Err(e) => return Err(Error::system("read", self.path, &e)),
+            }
+        }
+        Ok(())
     }
 
     /// Goes past `count` bytes that [`Source::peek`] has shown.
     pub(super) fn consume(&mut self, count: usize) {
         self.used += count;
-        debug_assert!(self.used <= self.buffer.len());
+        debug_assert!(self.used <= self.filled);
     }
 
     /// Goes past `count` bytes.

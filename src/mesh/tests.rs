@@ -426,6 +426,28 @@ fn every_format_gives_back_the_cube_that_was_written() {
 }
 
 #[test]
+fn compressed_files_hold_what_the_others_do_and_damaged_ones_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    for Sample { name, bytes } in samples() {
+        let read_from = |name: &str, bytes: &[u8]| {
+            let path = folder.path().join(name);
+            std::fs::write(&path, bytes).unwrap();
+            read(&path, &ReadOptions::default()).map(|loaded| loaded.mesh)
+        };
+        let mut gzip = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+        gzip.write_all(&bytes).unwrap();
+        let compressed = gzip.finish().unwrap();
+        let plain = read_from(name, &bytes).unwrap();
+        let name = format!("{name}.GZ");
+        assert_eq!(read_from(&name, &compressed).unwrap(), plain, "{name}");
+        for damaged in [&compressed[..compressed.len() - 9], &bytes] {
+            let error = read_from(&name, damaged).unwrap_err().to_string();
+            assert!(error.contains("the compressed file is damaged"), "{error}");
+        }
+    }
+}
+
+#[test]
 fn damaged_files_are_read_or_refused_but_never_panic() {
     let mut state = 1_u64;
     let mut random = |below: usize| {

@@ -7,7 +7,10 @@ use glam::{DMat4, DVec3, Vec3};
 
 use crate::description::{Description, Options};
 use crate::error::{Error, Result};
-use crate::mesh::{BARE_COLOR, GltfCamera, Mesh, Projection, ReadOptions, read, read_gltf};
+use crate::mesh::{
+    BARE_COLOR, GltfCamera, Mesh, MeshFile, Projection, ReadMesh, ReadOptions, extension, read,
+    read_gltf,
+};
 
 /// Which way is up in a mesh file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -34,7 +37,7 @@ fn plugin(path: &Path) -> Option<&'static str> {
         ("gltf", "gltf"),
         ("glb", "gltf"),
     ];
-    let extension = path.extension()?.to_str()?.to_lowercase();
+    let extension = extension(path);
     PLUGINS
         .iter()
         .find_map(|(e, plugin)| (*e == extension).then_some(*plugin))
@@ -43,8 +46,17 @@ fn plugin(path: &Path) -> Option<&'static str> {
 /// The camera's vertical field of view in degrees.
 const FOV: f32 = 30.0;
 
-/// A scene around the mesh in `path`. Its parameters can be overridden as any scene's.
-pub fn describe_mesh(path: &Path, up: UpAxis, options: &Options) -> Result<Description> {
+/// A scene around a mesh.
+#[derive(Debug)]
+pub struct BareMesh {
+    /// The scene. Its parameters can be overridden as any scene's.
+    pub description: Description,
+    /// The mesh: give it to the [`Session`](super::Session), and it is not read again.
+    pub mesh: ReadMesh,
+}
+
+/// A scene around the mesh in `path`.
+pub fn describe_mesh(path: &Path, up: UpAxis, options: &Options) -> Result<BareMesh> {
     let Some(plugin) = plugin(path) else {
         return Err(Error::input(format!(
             "{} is no mesh that Étendue reads",
@@ -83,7 +95,13 @@ pub fn describe_mesh(path: &Path, up: UpAxis, options: &Options) -> Result<Descr
         strict: false,
         ..options.clone()
     };
-    Description::parse(&text, path, &options)
+    let description = Description::parse(&text, path, &options)?;
+    let file = MeshFile {
+        path: path.to_owned(),
+        options: read_options,
+    };
+    let mesh = ReadMesh { file, loaded };
+    Ok(BareMesh { description, mesh })
 }
 
 /// What the scene shows.
@@ -242,7 +260,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join(name);
         std::fs::write(&path, text).unwrap();
-        describe_mesh(&path, UpAxis::Y, &Options::default()).unwrap()
+        let bare = describe_mesh(&path, UpAxis::Y, &Options::default());
+        bare.unwrap().description
     }
 
     const PLY: &str = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n\
@@ -297,7 +316,8 @@ mod tests {
         let obj = "mtllib red.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\n";
         std::fs::write(&path, obj).unwrap();
         let textures = || {
-            let scene = describe_mesh(&path, UpAxis::Y, &Options::default()).unwrap();
+            let bare = describe_mesh(&path, UpAxis::Y, &Options::default());
+            let scene = bare.unwrap().description;
             let shape = scene.root().children(Kind::Shape)[2];
             assert_eq!(shape.boolean("materials").unwrap(), Some(true));
             let diffuse = shape.children(Kind::Bsdf)[0].children(Kind::Bsdf)[0];

@@ -15,6 +15,7 @@ use super::options::{Colors, Options};
 use super::plan::{PASS, TILE};
 use crate::description::{Canonical, Description, NodeId, Part};
 use crate::error::{Error, Result};
+use crate::mesh;
 
 /// What an image depends on, part by part.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -130,11 +131,14 @@ const MAX_GLTF: u64 = 256 << 20;
 /// The existing files that a glTF file (as text) names; none of other files, nor where it is damaged,
 /// which is for its reader to say.
 fn buffers(path: &Path) -> Vec<PathBuf> {
-    let is_gltf = path
-        .extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("gltf"));
-    let small = fs::metadata(path).is_ok_and(|m| m.len() <= MAX_GLTF);
-    let text = (is_gltf && small).then(|| fs::read(path).ok()).flatten();
+    let read = || {
+        let mut text = Vec::new();
+        let contents = mesh::contents(path).ok()?;
+        contents.take(MAX_GLTF).read_to_end(&mut text).ok()?;
+        Some(text)
+    };
+    let is_gltf = mesh::extension(path) == "gltf";
+    let text = is_gltf.then(read).flatten();
     let Some(json) = text.and_then(|text| serde_json::from_slice::<serde_json::Value>(&text).ok())
     else {
         return Vec::new();

@@ -31,10 +31,10 @@ use crate::image::{Image, Metadata, Window};
 use crate::integrator::Stats;
 
 pub use adaptive::AdaptiveReport;
-pub use bare::{UpAxis, describe_mesh, is_mesh};
+pub use bare::{BareMesh, UpAxis, describe_mesh, is_mesh};
 pub use check::check;
 pub use info::{NamedFile, SceneInfo, SensorInfo};
-pub use memory::human_bytes;
+pub use memory::{check_mesh, human_bytes};
 pub use options::{Adaptive, Checkpoint, Colors, Options, Overrides};
 pub use plan::Completed;
 pub use progress::{Phase, Progress, Silent};

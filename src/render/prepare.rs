@@ -17,6 +17,7 @@ use crate::description::{Description, Kind, NodeId, Properties};
 use crate::error::{Error, Problem, Problems, Result};
 use crate::image::{Metadata, Window};
 use crate::integrator::{self, Estimator, Integrator};
+use crate::mesh::ReadMesh;
 use crate::sampler::Sampler;
 use crate::scene::{self, Assets, Scene};
 use crate::sensor::{Film, Sensor};
@@ -31,6 +32,15 @@ pub(super) struct Kept {
     facts: Facts,
     /// The time that it took, until a render has told it.
     pub(super) spent: Seconds,
+}
+
+/// What is in memory from one render to the next.
+#[derive(Debug, Default)]
+pub(super) struct Shelf {
+    /// The last scene.
+    pub(super) kept: Option<Kept>,
+    /// A mesh of the next scene.
+    pub(super) given: Option<ReadMesh>,
 }
 
 /// What two renders must agree in to share a scene.
@@ -146,15 +156,17 @@ pub(super) fn view<C: ColorModel>(description: &Description, sensor: NodeId) -> 
     })
 }
 
-/// Loads the shapes, and displaces those that want it as far as the `limit` on bytes allows.
+/// Loads the shapes but for the mesh that is `given`, and displaces those that want it as far as the `limit` on bytes
+/// allows.
 pub(super) fn load(
     description: &Description,
+    given: Option<ReadMesh>,
     limit: Option<u64>,
     progress: &dyn Progress,
 ) -> Result<Assets> {
     let shapes = description.root().children(Kind::Shape).len();
     progress.begin(Phase::Load, shapes as u64);
-    let mut assets = Assets::load(description, &|| progress.advance(1, 0))?;
+    let mut assets = Assets::load(description, given, &|| progress.advance(1, 0))?;
     assets.displace(description, limit.map(memory::triangles))?;
     Ok(assets)
 }
@@ -168,6 +180,12 @@ struct Share {
     rays: u64,
 }
 
+/// What a scene is made from.
+struct Source<'a> {
+    description: &'a Description,
+    given: Option<ReadMesh>,
+}
+
 /// How many rays a film of so many samples a pixel takes, as a rule: paths of three bounces that each ask
 /// for light.
 fn rays(film: &Film, samples: u32) -> u64 {
@@ -178,7 +196,7 @@ fn rays(film: &Film, samples: u32) -> u64 {
 
 /// Loads the shapes and builds the scene, having made sure that there is room for it.
 fn make<C: ColorModel>(
-    description: &Description,
+    Source { description, given }: Source<'_>,
     options: &Options,
     color: C,
     Share { film, rays }: Share,
@@ -192,7 +210,7 @@ fn make<C: ColorModel>(
     announced.check(options.memory_limit)?;
     let assets = timed(&mut seconds.load, || {
         let limit = options.memory_limit.map(|limit| limit.saturating_sub(film));
-        load(description, limit, progress)
+        load(description, given, limit, progress)
     })
     .map_err(|error| {
         // What is wrong with materials is told along with what is wrong with shapes.
@@ -232,14 +250,16 @@ fn make<C: ColorModel>(
     Ok((scene, facts, seconds))
 }
 
-/// Builds the job; `kept` is its scene where the description's is equal, else it makes room for the new one.
+/// Builds the job; what is kept is its scene where the description's is equal, else it makes room for the new one.
 pub(super) fn prepare<'k, C: ColorModel>(
-    kept: &'k mut Option<Kept>,
+    shelf: &'k mut Shelf,
     description: &Description,
     options: &Options,
     color: C,
     progress: &dyn Progress,
 ) -> Result<Job<'k, C>> {
+    let Shelf { kept, given } = shelf;
+    let given = given.take();
     let mut problems = Problems::default();
     let key = Key {
         scene: fingerprint::scene_key(description),
@@ -266,7 +286,8 @@ pub(super) fn prepare<'k, C: ColorModel>(
         }
     } else {
         *kept = None;
-        let made = make(description, options, color, share, progress);
+        let source = Source { description, given };
+        let made = make(source, options, color, share, progress);
         *kept = problems.take(made).map(|(scene, facts, spent)| Kept {
             key,
             scene: Box::new(scene),

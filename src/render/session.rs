@@ -10,7 +10,7 @@ use super::adaptive::{self, AdaptiveReport};
 use super::checkpoint::Keeper;
 use super::options::{Adaptive, Colors, Options};
 use super::plan::Completed;
-use super::prepare::{self, Facts, Job, Kept};
+use super::prepare::{self, Facts, Job, Shelf};
 use super::progress::Progress;
 use super::sums::{Accumulator, Tally};
 use super::uniform;
@@ -19,13 +19,14 @@ use crate::color::{Bands, ColorModel, Rgb};
 use crate::description::Description;
 use crate::error::{Error, Result};
 use crate::image::Image;
+use crate::mesh::ReadMesh;
 use crate::shape::Bounds;
 
 /// Renders that follow one another; see the module.
 #[derive(Debug, Default)]
 pub struct Session {
     pool: Option<Pool>,
-    kept: Option<Kept>,
+    shelf: Shelf,
 }
 
 #[derive(Debug)]
@@ -60,7 +61,7 @@ fn bands<const N: usize>(count: usize) -> Result<Bands<N>> {
 
 /// What every task of a session is about.
 struct Ask<'a> {
-    kept: &'a mut Option<Kept>,
+    shelf: &'a mut Shelf,
     description: &'a Description,
     options: &'a Options,
     progress: &'a dyn Progress,
@@ -74,12 +75,12 @@ impl Task for Measure<'_> {
 
     fn run<C: ColorModel>(self, color: C) -> Result<Facts> {
         let Ask {
-            kept,
+            shelf,
             description,
             options,
             progress,
         } = self.0;
-        let job = prepare::prepare(kept, description, options, color, progress)?;
+        let job = prepare::prepare(shelf, description, options, color, progress)?;
         let mut facts = job.facts.clone();
         facts.warnings = job.warnings;
         Ok(facts)
@@ -94,12 +95,12 @@ impl Task for Render<'_> {
 
     fn run<C: ColorModel>(self, color: C) -> Result<Rendered> {
         let Ask {
-            kept,
+            shelf,
             description,
             options,
             progress,
         } = self.0;
-        let job = prepare::prepare(kept, description, options, color, progress)?;
+        let job = prepare::prepare(shelf, description, options, color, progress)?;
         let mut keeper = match &options.checkpoint {
             Some(checkpoint) => {
                 let fingerprint = job.fingerprint(description, options)?;
@@ -138,7 +139,7 @@ impl Task for Render<'_> {
             report,
             warnings,
         };
-        if let Some(kept) = kept {
+        if let Some(kept) = &mut shelf.kept {
             kept.spent = Seconds::default();
         }
         Ok(rendered)
@@ -193,6 +194,11 @@ impl Finished {
 }
 
 impl Session {
+    /// Takes a mesh that was read already: the next scene does not read it again.
+    pub fn give(&mut self, mesh: ReadMesh) {
+        self.shelf.given = Some(mesh);
+    }
+
     /// Renders what `description` says. `description` has the options' overrides already: see
     /// [`Overrides::apply`](super::Overrides::apply). A render that was stopped is no error: the report
     /// says what is complete.
@@ -206,9 +212,9 @@ impl Session {
         options: &Options,
         progress: &dyn Progress,
     ) -> Result<Rendered> {
-        self.run(options, |kept| {
+        self.run(options, |shelf| {
             let ask = Ask {
-                kept,
+                shelf,
                 description,
                 options,
                 progress,
@@ -237,9 +243,9 @@ impl Session {
         options: &Options,
         progress: &dyn Progress,
     ) -> Result<Facts> {
-        self.run(options, |kept| {
+        self.run(options, |shelf| {
             let ask = Ask {
-                kept,
+                shelf,
                 description,
                 options,
                 progress,
@@ -252,9 +258,9 @@ impl Session {
     fn run<T: Send>(
         &mut self,
         options: &Options,
-        work: impl FnOnce(&mut Option<Kept>) -> Result<T> + Send,
+        work: impl FnOnce(&mut Shelf) -> Result<T> + Send,
     ) -> Result<T> {
-        let kept = &mut self.kept;
+        let shelf = &mut self.shelf;
         let pool = match &mut self.pool {
             Some(pool) if pool.asked == options.threads => pool,
             pool => pool.insert(Pool {
@@ -262,7 +268,7 @@ impl Session {
                 threads: start(options.threads)?,
             }),
         };
-        pool.threads.install(|| work(kept))
+        pool.threads.install(|| work(shelf))
     }
 }
 

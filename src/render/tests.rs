@@ -419,14 +419,30 @@ fn a_bare_mesh_is_in_the_middle_of_its_turntable() {
     let place = Place::new();
     let path = place.path("floor.ply");
     let options = description::Options::default();
-    let description = describe_mesh(&path, UpAxis::Y, &options).unwrap();
+    let bare = describe_mesh(&path, UpAxis::Y, &options).unwrap();
     let bounds = Session::default()
-        .bounds(&description, &Options::default(), &Silent)
+        .bounds(&bare.description, &Options::default(), &Silent)
         .unwrap();
     let mesh = read(Path::new(&path), &Default::default()).unwrap().mesh;
     let (low, high) = mesh.bounds().unwrap();
     let off = 0.5 * (bounds.min + bounds.max) - 0.5 * (low + high);
     assert!(off.x.abs() < 1e-3 && off.z.abs() < 1e-3, "{off}");
+}
+
+#[test]
+fn a_mesh_that_is_given_is_not_read_again() {
+    let place = Place::new();
+    let path = place.path("floor.ply");
+    let bare = describe_mesh(&path, UpAxis::Y, &description::Options::default()).unwrap();
+    let BareMesh { description, mesh } = bare;
+    fs::write(&path, "nothing of use").unwrap();
+    let mut session = Session::default();
+    let mut bounds = |mesh: Option<_>| {
+        mesh.into_iter().for_each(|mesh| session.give(mesh));
+        session.bounds(&description, &Options::default(), &Silent)
+    };
+    bounds(None).unwrap_err();
+    bounds(Some(mesh)).unwrap();
 }
 
 #[test]

@@ -10,13 +10,14 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use glam::DMat4;
-use rayon::prelude::*;
 
+use super::files::{self, Site};
 use crate::accel::Instance;
 use crate::description::{Description, Kind, NodeId, Properties};
 use crate::error::{Error, Problem, Problems, Result};
 use crate::math::Transform;
-use crate::shape::{self, Geometry, Shape};
+use crate::mesh::ReadMesh;
+use crate::shape::{self, Geometry};
 
 /// The geometry of a scene, loaded: it does not depend on colour, sensor or film.
 #[derive(Debug)]
@@ -41,8 +42,12 @@ pub(super) struct Member {
 
 impl Assets {
     /// Loads the shapes of a scene, several at once; `loaded` is called after each that stands in the
-    /// scene itself.
-    pub fn load(description: &Description, loaded: &(impl Fn() + Sync)) -> Result<Self> {
+    /// scene itself. The mesh that is `given` is not read again.
+    pub fn load(
+        description: &Description,
+        given: Option<ReadMesh>,
+        loaded: &(impl Fn() + Sync),
+    ) -> Result<Self> {
         let mut plan = Plan::default();
         for properties in description.root().children(Kind::Shape) {
             let placed = plan.place(properties, &Space::WORLD);
@@ -58,16 +63,16 @@ impl Assets {
             mut problems,
             ..
         } = plan;
-        let results: Vec<Result<Shape>> = shapes
-            .par_iter()
-            .map(|Planned { properties, space }| {
-                let shape = shape::build_within(&space.outer, properties);
-                if space.top {
-                    loaded();
-                }
-                shape
-            })
-            .collect();
+        let sites = shapes.iter().map(|planned| Site {
+            properties: &planned.properties,
+            outer: &planned.space.outer,
+        });
+        let sites: Vec<Site<'_>> = sites.collect();
+        let results = files::build(&sites, given, &|place| {
+            if shapes[place].space.top {
+                loaded();
+            }
+        });
         let mut warnings: Vec<Problem> = media(&shapes).into_iter().collect();
         let mut members = Vec::with_capacity(shapes.len());
         for (Planned { properties, space }, result) in shapes.iter().zip(results) {
@@ -289,7 +294,7 @@ mod tests {
     fn load_in_part(text: &str) -> Result<(Assets, Vec<Problem>)> {
         let text = format!(r#"<scene version="3.0.0">{text}</scene>"#);
         let scene = Description::parse(&text, Path::new("test.xml"), &Options::default())?;
-        let assets = Assets::load(&scene, &|| ())?;
+        let assets = Assets::load(&scene, None, &|| ())?;
         Ok((assets, scene.unread()))
     }
 

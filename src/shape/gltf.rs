@@ -2,13 +2,10 @@
 //! `flip_normals` and `flip_tex_coords`; the materials' base colours are its attribute `face_color`. Étendue's
 //! own: Mitsuba has no such shape.
 
-use glam::DMat4;
-
-use super::{Shape, mesh};
 use crate::description::Properties;
 use crate::error::Result;
 use crate::mesh::ReadOptions;
 
-pub(super) fn build(properties: &Properties<'_>, outer: &DMat4) -> Result<Shape> {
-    mesh::load(properties, outer, ReadOptions::default())
+pub(super) fn options(_properties: &Properties<'_>) -> Result<ReadOptions> {
+    Ok(ReadOptions::default())
 }

@@ -14,7 +14,7 @@ use crate::error::Result;
 use crate::interaction::{Hit, Interaction, Ray};
 use crate::math::distribution::Discrete;
 use crate::math::{Frame, offset, warp};
-use crate::mesh::{Mesh, ReadOptions, read};
+use crate::mesh::{Loaded, Mesh, MeshFile, ReadOptions};
 
 /// A mesh in world space.
 #[derive(Debug)]
@@ -236,9 +236,13 @@ impl Surface for TriangleMesh {
 
 /// Puts a mesh into the world as its shape says: `to_world`, `face_normals`, `flip_normals`.
 pub(super) fn place(mut mesh: Mesh, properties: &Properties<'_>, outer: &DMat4) -> Result<Shape> {
-    mesh.transform(&to_world(properties, outer)?);
-    // A transform can carry finite corners to infinity.
-    let dropped = mesh.check().dropped_triangles;
+    let to_world = to_world(properties, outer)?;
+    let mut dropped = 0;
+    if to_world != DMat4::IDENTITY {
+        mesh.transform(&to_world);
+        // A transform can carry finite corners to infinity.
+        dropped = mesh.check().dropped_triangles;
+    }
     if properties.boolean("face_normals")?.unwrap_or(false) {
         mesh.drop_normals();
     } else if mesh.normals.is_empty() {
@@ -259,12 +263,8 @@ pub(super) fn place(mut mesh: Mesh, properties: &Properties<'_>, outer: &DMat4) 
     Ok(shape)
 }
 
-/// Reads the file that a mesh plugin names, with that plugin's own `options`.
-pub(super) fn load(
-    properties: &Properties<'_>,
-    outer: &DMat4,
-    options: ReadOptions,
-) -> Result<Shape> {
+/// The file that a mesh plugin names, to be read with that plugin's own `options`.
+pub(super) fn file(properties: &Properties<'_>, options: ReadOptions) -> Result<MeshFile> {
     let Some(path) = properties.file("filename")? else {
         return Err(properties
             .error(
@@ -278,7 +278,15 @@ pub(super) fn load(
         flip_tex_coords,
         ..options
     };
-    let loaded = read(&path, &options).map_err(|e| e.named_at(properties.location()))?;
+    Ok(MeshFile { path, options })
+}
+
+/// The shape that a mesh plugin makes of its file.
+pub(super) fn place_file(
+    loaded: Loaded,
+    properties: &Properties<'_>,
+    outer: &DMat4,
+) -> Result<Shape> {
     let mut shape = place(loaded.mesh, properties, outer)?;
     shape.warnings.splice(0..0, loaded.warnings);
     Ok(shape)

@@ -28,7 +28,7 @@ use crate::error::{Problem, Result};
 use crate::family;
 use crate::interaction::{Hit, Interaction, Ray};
 use crate::math::{Transform, offset};
-use crate::mesh::Mesh;
+use crate::mesh::{Loaded, Mesh, MeshFile, ReadOptions, read};
 
 pub use disk::Disk;
 pub use frustum::Frustum;
@@ -220,26 +220,38 @@ impl From<Geometry> for Shape {
     }
 }
 
-/// What builds a shape that stands in groups whose transforms make up the matrix.
-type Build = fn(&Properties<'_>, &DMat4) -> Result<Shape>;
+/// How a plugin comes to its shape.
+enum Build {
+    /// By itself, in groups whose transforms make up the matrix.
+    Made(fn(&Properties<'_>, &DMat4) -> Result<Shape>),
+    /// From the file `filename`, which is read with these options.
+    Read(fn(&Properties<'_>) -> Result<ReadOptions>),
+}
 
 /// The shape plugins.
 const PLUGINS: &[(&str, Build)] = &[
-    ("cone", cone::build),
-    ("cube", cube::build),
-    ("cylinder", cylinder::build),
-    ("disk", disk::build),
-    ("gltf", gltf::build),
-    ("obj", obj::build),
-    ("plane", plane::build),
-    ("ply", ply::build),
-    ("polygon", polygon::build),
-    ("rectangle", rectangle::build),
-    ("serialized", serialized::build),
-    ("sphere", sphere::build),
-    ("stl", stl::build),
-    ("triangle", triangle::build),
+    ("cone", Build::Made(cone::build)),
+    ("cube", Build::Made(cube::build)),
+    ("cylinder", Build::Made(cylinder::build)),
+    ("disk", Build::Made(disk::build)),
+    ("gltf", Build::Read(gltf::options)),
+    ("obj", Build::Read(obj::options)),
+    ("plane", Build::Made(plane::build)),
+    ("ply", Build::Read(ply::options)),
+    ("polygon", Build::Made(polygon::build)),
+    ("rectangle", Build::Made(rectangle::build)),
+    ("serialized", Build::Read(serialized::options)),
+    ("sphere", Build::Made(sphere::build)),
+    ("stl", Build::Read(stl::options)),
+    ("triangle", Build::Made(triangle::build)),
 ];
+
+/// The plugin that `properties` name, if there is one.
+fn plugin(properties: &Properties<'_>) -> Option<&'static Build> {
+    let mut plugins = PLUGINS.iter();
+    let named = plugins.find(|(name, _)| *name == properties.plugin());
+    named.map(|(_, build)| build)
+}
 
 /// Shapes made of shapes, which the scene puts together: several in a space of their own, and those once
 /// more in the world.
@@ -269,11 +281,14 @@ pub fn build(properties: &Properties<'_>) -> Result<Shape> {
 pub fn build_within(outer: &DMat4, properties: &Properties<'_>) -> Result<Shape> {
     debug_assert_eq!(properties.kind(), Kind::Shape);
     check_strict(properties)?;
-    match PLUGINS
-        .iter()
-        .find(|(name, _)| *name == properties.plugin())
-    {
-        Some((_, build)) => build(properties, outer),
+    match plugin(properties) {
+        Some(Build::Made(build)) => build(properties, outer),
+        Some(Build::Read(options)) => {
+            let file = mesh::file(properties, options(properties)?)?;
+            let loaded = read(&file.path, &file.options);
+            let loaded = loaded.map_err(|e| e.named_at(properties.location()))?;
+            mesh::place_file(loaded, properties, outer)
+        }
         None => Err(family::unknown(
             properties,
             "shape",
@@ -281,6 +296,20 @@ pub fn build_within(outer: &DMat4, properties: &Properties<'_>) -> Result<Shape>
             &names(),
         )),
     }
+}
+
+/// The mesh file from which the shape is built; `None` where it needs none, or does not say it right.
+pub fn mesh_file(properties: &Properties<'_>) -> Option<MeshFile> {
+    match plugin(properties)? {
+        Build::Made(_) => None,
+        Build::Read(options) => mesh::file(properties, options(properties).ok()?).ok(),
+    }
+}
+
+/// As [`build_within`], with the [`mesh_file`] read already.
+pub fn build_from(loaded: Loaded, outer: &DMat4, properties: &Properties<'_>) -> Result<Shape> {
+    check_strict(properties)?;
+    mesh::place_file(loaded, properties, outer)
 }
 
 /// The property `to_world`, the identity by default, and then `outer`.

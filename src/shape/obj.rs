@@ -2,21 +2,14 @@
 //! `flip_normals` and `flip_tex_coords`; with Étendue's own `materials` (false), the colours of the materials that
 //! the file names are its attribute `face_color`.
 
-use glam::DMat4;
-
-use super::{Shape, mesh};
 use crate::description::Properties;
 use crate::error::Result;
 use crate::mesh::ReadOptions;
 
-pub(super) fn build(properties: &Properties<'_>, outer: &DMat4) -> Result<Shape> {
+pub(super) fn options(properties: &Properties<'_>) -> Result<ReadOptions> {
     let materials = properties.boolean("materials")?.unwrap_or(false);
-    mesh::load(
-        properties,
-        outer,
-        ReadOptions {
-            materials,
-            ..ReadOptions::default()
-        },
-    )
+    Ok(ReadOptions {
+        materials,
+        ..ReadOptions::default()
+    })
 }

@@ -17,6 +17,7 @@ mod portable;
 mod state;
 
 use glam::Vec3;
+use rayon::prelude::*;
 
 use super::triangle::Shear;
 use super::{Build, Counts};
@@ -39,6 +40,10 @@ pub(super) trait Walker {
 
 /// The items that a tree is built over.
 pub(super) trait Leaves: Sync {
+    /// How many there are.
+    fn count(&self) -> u32;
+    /// An item's box, finite and not empty.
+    fn bounds(&self, item: u32) -> Bounds;
     /// Whether an item is a triangle.
     fn is_triangle(&self, item: u32) -> bool;
     /// A triangle's number in the scene, and its corners.
@@ -66,10 +71,16 @@ impl Default for Tree {
 }
 
 impl Tree {
-    /// A tree over items with these boxes, which are finite and not empty; and the items that are no
-    /// triangles, in the order in which the walker is asked for them.
-    pub(super) fn build(boxes: &[Bounds], leaves: &impl Leaves, work: Build) -> (Self, Vec<u32>) {
-        match build::binary(boxes, work) {
+    /// A tree over these items; and those of them that are no triangles, in the order in which the walker is
+    /// asked for them.
+    pub(super) fn build(leaves: &impl Leaves, work: Build) -> (Self, Vec<u32>) {
+        let boxes: Vec<Bounds> = (0..leaves.count())
+            .into_par_iter()
+            .map(|item| leaves.bounds(item))
+            .collect();
+        let binary = build::binary(&boxes, work);
+        drop(boxes);
+        match binary {
             Some(binary) => collapse::collapse(&binary, leaves),
             None => Default::default(),
         }

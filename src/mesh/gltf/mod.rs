@@ -12,7 +12,7 @@ use glam::{DMat4, DVec4, Vec2, Vec3};
 use gltf::mesh::Mode;
 use gltf::{Document, Node, Primitive, Semantic};
 
-use super::read::{Decoded, Input, Loaded, ReadOptions, open, warnings};
+use super::read::{Decoded, Input, Loaded, ReadOptions, warnings, with_input};
 use super::{Attribute, Mesh, Per};
 use crate::error::{Error, Location, Problem, Result};
 use buffers::{Buffers, Container};
@@ -84,15 +84,7 @@ const MOST: usize = 1 << 28;
 /// # Errors
 /// Where the file or a buffer that it names cannot be read or is malformed.
 pub fn read_gltf(path: &Path, options: &ReadOptions) -> Result<GltfScene> {
-    let file = open(path)?;
-    let walk = walk(
-        Input {
-            path,
-            length: file.length,
-            reader: &mut &file.file,
-        },
-        options,
-    )?;
+    let walk = with_input(path, |input| walk(input, options))?;
     let mut scene = GltfScene {
         camera: walk.camera,
         ..GltfScene::default()

@@ -1,25 +1,30 @@
 //! PLY: any order and type of properties, ASCII and binary of both endians. Rows of fixed size are decoded
-//! column by column straight from the buffer; ASCII rows, and those with lists, are first written out as
-//! rows of f64, so that one decoder serves all. Polygons are fans around their first corner; elements other
+//! column by column, in parallel, straight from the buffer; ASCII rows, and those with lists, are first written
+//! out as rows of f64, so that one decoder serves all. Polygons are fans around their first corner; elements other
 //! than `vertex` and `face` are skipped. Texture coordinates are `u v`, `s t` or `texture_u texture_v`.
 
 mod attributes;
 mod header;
+mod rows;
 mod write;
 
 use glam::{Vec2, Vec3};
+use rayon::prelude::*;
 
 use super::read::{Decoded, Input, ReadOptions};
 use super::source::Source;
-use super::{Attribute, Mesh, Per};
+use super::{Attribute, GRAIN, Mesh, Per};
 use crate::error::Result;
 use attributes::Plan;
 use header::{Element, Encoding, Header, Kind, Scalar};
+use rows::{Column, Rows};
 
 pub use write::{check_writable, write_ply, write_text};
 
 /// Rows that are written out at a time where they are not of fixed size.
 const ROWS: u64 = 1 << 10;
+/// Bytes that are decoded at a time: enough for all threads, and few enough for the cache.
+const BLOCK: usize = 1 << 22;
 
 pub(super) fn read(input: Input<'_>, options: &ReadOptions) -> Result<Decoded> {
     let mut source = Source::new(input);
@@ -74,43 +79,6 @@ struct Ply<'a> {
     /// As the header promises them.
     vertices: u64,
     decoded: Decoded,
-}
-
-/// One property in rows of bytes.
-#[derive(Clone, Copy)]
-struct Column {
-    offset: usize,
-    scalar: Scalar,
-}
-
-/// Rows of `stride` bytes.
-#[derive(Clone, Copy)]
-struct Rows<'a> {
-    bytes: &'a [u8],
-    stride: usize,
-    encoding: Encoding,
-}
-
-impl Rows<'_> {
-    /// The `columns` of each row.
-    fn get<const N: usize>(&self, columns: [Column; N], mut each: impl FnMut([f32; N])) {
-        let rows = self.bytes.chunks_exact(self.stride);
-        if self.encoding == Encoding::LittleEndian
-            && columns.iter().all(|c| c.scalar == Scalar::F32)
-        {
-            let offsets = columns.map(|c| c.offset);
-            for row in rows {
-                each(offsets.map(|o| {
-                    let bytes = row[o..].first_chunk().expect("the column lies in the row");
-                    f32::from_le_bytes(*bytes)
-                }));
-            }
-        } else {
-            for row in rows {
-                each(columns.map(|c| c.scalar.decode(&row[c.offset..], self.encoding) as f32));
-            }
-        }
-    }
 }
 
 impl Ply<'_> {
@@ -171,20 +139,15 @@ impl Ply<'_> {
         mesh.normals.reserve_exact(normal.map_or(0, |_| count));
         mesh.uvs.reserve_exact(uv.map_or(0, |_| count));
         self.each_rows(element, stride, |rows| {
-            rows.get(position, |p| mesh.positions.push(Vec3::from_array(p)));
+            rows.get(position, &mut mesh.positions, Vec3::from_array);
             if let Some(normal) = normal {
-                rows.get(normal, |n| mesh.normals.push(Vec3::from_array(n)));
+                rows.get(normal, &mut mesh.normals, Vec3::from_array);
             }
             if let Some(uv) = uv {
-                rows.get(uv, |uv| mesh.uvs.push(Vec2::from_array(uv)));
+                rows.get(uv, &mut mesh.uvs, Vec2::from_array);
             }
             for (attribute, columns) in mesh.attributes.iter_mut().zip(&attributes) {
-                for row in rows.bytes.chunks_exact(rows.stride) {
-                    let values = columns
-                        .iter()
-                        .map(|c| c.scalar.decode(&row[c.offset..], rows.encoding) as f32);
-                    attribute.values.extend(values);
-                }
+                rows.get_all(columns, &mut attribute.values);
             }
         })?;
         mesh.triangles = std::mem::take(&mut self.decoded.mesh.triangles);
@@ -221,7 +184,7 @@ impl Ply<'_> {
         let encoding = self.encoding;
         if encoding != Encoding::Ascii && element.stride().is_some() {
             while left > 0 {
-                let shown = self.source.peek(stride)?;
+                let shown = self.source.peek(BLOCK.max(stride))?;
                 let fitting =
                     (shown.len() / stride).min(usize::try_from(left).unwrap_or(usize::MAX));
                 if fitting == 0 {
@@ -342,32 +305,38 @@ impl Ply<'_> {
         const ROW: usize = 13;
         let before = triangles.len();
         let done = |triangles: &Vec<_>| (triangles.len() - before) as u64;
+        let encoding = self.encoding;
+        // The first face may be none, as all others.
+        let mut block = ROW;
         loop {
-            let encoding = self.encoding;
-            let shown = self.source.peek(ROW)?;
+            let shown = self.source.peek(block)?;
             let left = usize::try_from(most - done(triangles)).unwrap_or(usize::MAX);
-            let mut used = 0;
-            let (mut highest, first) = (0, triangles.len());
-            for row in shown
-                .chunks_exact(ROW)
-                .take(left)
-                .take_while(|row| row[0] == 3)
-            {
-                let triangle = [1, 5, 9].map(|at| {
+            let rows = shown.chunks_exact(ROW).take(left);
+            let used = ROW * rows.take_while(|row| row[0] == 3).count();
+            if used == 0 {
+                return Ok(done(triangles));
+            }
+            let first = triangles.len();
+            let triangle = |row: &[u8]| {
+                [1, 5, 9].map(|at| {
                     let bytes = *row[at..].first_chunk().expect("a row has 13 bytes");
                     match encoding {
                         Encoding::BigEndian => u32::from_be_bytes(bytes),
                         _ => u32::from_le_bytes(bytes),
                     }
-                });
-                highest = triangle.into_iter().fold(highest, u32::max);
-                triangles.push(triangle);
-                used += ROW;
-            }
-            if used == 0 {
-                return Ok(done(triangles));
+                })
+            };
+            let rows = &shown[..used];
+            if used < GRAIN * ROW {
+                // Among polygons there are many short runs.
+                triangles.extend(rows.chunks_exact(ROW).map(triangle));
+            } else {
+                let rows = rows.par_chunks_exact(ROW).with_min_len(GRAIN);
+                triangles.par_extend(rows.map(triangle));
             }
             self.source.consume(used);
+            let indices = triangles[first..].iter().flatten();
+            let highest = indices.fold(0, |highest, index| highest.max(*index));
             if u64::from(highest) >= self.vertices {
                 let is_wrong = |t: &[u32; 3]| t.iter().any(|&i| u64::from(i) >= self.vertices);
                 let at = first + triangles[first..].iter().position(is_wrong).unwrap_or(0);
@@ -375,6 +344,7 @@ impl Ply<'_> {
                 // Faces before this one may have been polygons: the number counts triangles.
                 return Err(self.out_of_range(at as u64, f64::from(wrong)));
             }
+            block = BLOCK;
         }
     }
 

@@ -5,40 +5,42 @@
 //! the last; lines that are neither `v`, `vt`, `vn` nor `f` are passed over, but for those that name
 //! materials where they are asked for.
 
+mod blocks;
+mod piece;
+
 use std::collections::HashMap;
 use std::path::Path;
 
 use glam::{Vec2, Vec3};
 
-use super::mtl::{BARE_COLOR, Materials, keyword};
+use super::mtl::{BARE_COLOR, Materials};
 use super::read::{Decoded, Input, ReadOptions};
 use super::{Attribute, Mesh, Per};
 use crate::error::{Error, Location, Result};
-
-/// What a line gives, or what is wrong with it, in words.
-type OfLine<T> = std::result::Result<T, String>;
-
-/// No vertex, or no index in a corner.
-const NONE: u32 = u32::MAX;
+use blocks::{Block, Blocks, CUTS, Cuts};
+use piece::{NONE, OfLine, Piece, new_index, shown};
 
 pub(super) fn read(input: Input<'_>, options: &ReadOptions) -> Result<Decoded> {
+    read_in(CUTS, input, options)
+}
+
+/// Reads the file in blocks. While one thread puts a block's pieces together, the others understand the
+/// next.
+fn read_in(cuts: Cuts, input: Input<'_>, options: &ReadOptions) -> Result<Decoded> {
     let path = input.path;
-    let mut bytes = input.bytes()?;
-    join_continued_lines(&mut bytes);
+    let length = input.length;
+    let mut blocks = Blocks::new(input, cuts);
     let mut obj = Obj::default();
-    let mut start = 0;
-    for line in bytes.split(|&b| b == b'\n') {
-        obj.line(line).map_err(|message| {
-            let before = bytes[..start]
-                .iter()
-                .filter(|&&b| b == b'\n' || b == JOINED)
-                .count();
-            let line = u32::try_from(before + 1).unwrap_or(0);
-            Error::input(message).at(&Location::of_line(path, line))
-        })?;
-        start += line.len() + 1;
+    let mut next = blocks.next()?;
+    while let Some(Block { pieces, wrong }) = next {
+        let (taken, read) = rayon::join(|| obj.take_all(pieces), || blocks.next());
+        taken.map_err(|message| Error::input(message).at(&Location::of_file(path)))?;
+        if let Some(wrong) = wrong {
+            return Err(wrong);
+        }
+        next = read?;
     }
-    check_text(&bytes, &obj, path)?;
+    check_text(length, &obj, path)?;
     let colors = options.materials.then(|| obj.face_colors(path));
     let mut decoded = obj.finish(options);
     if let Some(FaceColors {
@@ -52,30 +54,10 @@ pub(super) fn read(input: Input<'_>, options: &ReadOptions) -> Result<Decoded> {
     Ok(decoded)
 }
 
-/// Stands for the line end after a backslash: a blank that no file has otherwise.
-const JOINED: u8 = b'\x0c';
-
-/// A backslash at the end of a line continues it.
-fn join_continued_lines(bytes: &mut [u8]) {
-    for end in 1..bytes.len() {
-        if bytes[end] == b'\n' {
-            let last = if end > 1 && bytes[end - 1] == b'\r' {
-                end - 2
-            } else {
-                end - 1
-            };
-            if bytes[last] == b'\\' {
-                bytes[last] = b' ';
-                bytes[end] = JOINED;
-            }
-        }
-    }
-}
-
 /// A file of which nothing was understood is no OBJ.
-fn check_text(bytes: &[u8], obj: &Obj, path: &Path) -> Result<()> {
+fn check_text(length: u64, obj: &Obj, path: &Path) -> Result<()> {
     if obj.positions.is_empty() {
-        let message = if bytes.is_empty() {
+        let message = if length == 0 {
             "the file is empty"
         } else {
             "the file has no vertices"
@@ -122,76 +104,53 @@ struct FaceColors {
 }
 
 impl Obj {
-    fn line(&mut self, line: &[u8]) -> OfLine<()> {
-        let mut words = line
-            .split(u8::is_ascii_whitespace)
-            .filter(|w| !w.is_empty());
-        match words.next() {
-            Some(b"v") => {
-                let position = numbers(&mut words, 3)?;
-                new_index(self.positions.len())?;
-                self.positions.push(Vec3::from_array(position));
+    fn take_all(&mut self, pieces: Vec<Piece>) -> OfLine<()> {
+        pieces.into_iter().try_for_each(|piece| self.take(piece))
+    }
+
+    /// Appends what stands in a piece.
+    fn take(&mut self, mut piece: Piece) -> OfLine<()> {
+        self.positions.append(&mut piece.positions);
+        self.uvs.append(&mut piece.uvs);
+        self.normals.append(&mut piece.normals);
+        self.libraries.append(&mut piece.libraries);
+        self.first.resize(self.positions.len(), NONE);
+        let mut uses = piece.uses.into_iter().peekable();
+        let mut corners = piece.corners.iter();
+        for (face, &count) in piece.faces.iter().enumerate() {
+            while let Some((_, name)) = uses.next_if(|(before, _)| *before <= face) {
+                self.use_material(name);
             }
-            Some(b"vt") => {
-                let [u, v, _] = numbers(&mut words, 1)?;
-                self.uvs.push(Vec2::new(u, v));
-            }
-            Some(b"vn") => self.normals.push(Vec3::from_array(numbers(&mut words, 3)?)),
-            Some(b"f") => return self.face(words),
-            Some(b"mtllib") => self.libraries.push(keyword(line).1.to_vec()),
-            Some(b"usemtl") => {
-                let (from, name) = (self.triangles.len(), keyword(line).1.to_vec());
-                self.uses.pop_if(|last| last.from == from);
-                self.uses.push(Use { from, name });
-            }
-            _ => {}
+            let count = count as usize;
+            self.face(corners.by_ref().take(count))?;
+            self.degenerate += usize::from(count < 3);
         }
+        uses.for_each(|(_, name)| self.use_material(name));
         Ok(())
     }
 
-    fn face<'a>(&mut self, words: impl Iterator<Item = &'a [u8]>) -> OfLine<()> {
-        let mut corners = 0;
+    fn use_material(&mut self, name: Vec<u8>) {
+        let from = self.triangles.len();
+        self.uses.pop_if(|last| last.from == from);
+        self.uses.push(Use { from, name });
+    }
+
+    fn face<'a>(&mut self, corners: impl Iterator<Item = &'a [u32; 3]>) -> OfLine<()> {
         let (mut first, mut previous) = (NONE, NONE);
-        for word in words.take_while(|w| w[0] != b'#') {
-            let corner = self.corner(word)?;
-            let vertex = self.vertex(corner)?;
-            if corners == 0 {
+        for (i, corner) in corners.enumerate() {
+            let vertex = self.vertex(*corner)?;
+            if i == 0 {
                 first = vertex;
-            } else if corners > 1 {
+            } else if i > 1 {
                 self.triangles.push([first, previous, vertex]);
             }
             previous = vertex;
-            corners += 1;
         }
-        self.degenerate += usize::from(corners < 3);
         Ok(())
-    }
-
-    /// The indices that `v`, `v/vt`, `v//vn` or `v/vt/vn` name, from 0.
-    fn corner(&self, word: &[u8]) -> OfLine<[u32; 3]> {
-        let kinds = [
-            ("vertex", self.positions.len()),
-            ("texture coordinate", self.uvs.len()),
-            ("normal", self.normals.len()),
-        ];
-        let mut corner = [NONE; 3];
-        let mut parts = word.split(|&b| b == b'/');
-        for (i, (kind, count)) in kinds.into_iter().enumerate() {
-            match parts.next() {
-                None => break,
-                Some([]) if i > 0 => {}
-                Some(part) => corner[i] = index(part, count, kind, word)?,
-            }
-        }
-        match parts.next() {
-            None => Ok(corner),
-            Some(_) => Err(malformed(word)),
-        }
     }
 
     /// The vertex of the mesh for a corner.
     fn vertex(&mut self, corner: [u32; 3]) -> OfLine<u32> {
-        self.first.resize(self.positions.len(), NONE);
         let next = new_index(self.vertices.len())?;
         let first = &mut self.first[corner[0] as usize];
         let vertex = if *first == NONE {
@@ -273,65 +232,6 @@ impl Obj {
         }
         Decoded { mesh, warnings }
     }
-}
-
-/// The index of one more thing where there are `count`.
-fn new_index(count: usize) -> OfLine<u32> {
-    let index = u32::try_from(count).ok().filter(|&i| i != NONE);
-    index.ok_or_else(|| "there are more vertices than 32-bit indices reach".to_owned())
-}
-
-/// The first three of `words` as numbers, of which `least` must be there.
-fn numbers<'a>(words: &mut impl Iterator<Item = &'a [u8]>, least: usize) -> OfLine<[f32; 3]> {
-    let mut numbers = [0.0; 3];
-    for (i, number) in numbers.iter_mut().enumerate() {
-        match words.next().filter(|w| w[0] != b'#') {
-            Some(word) => {
-                *number =
-                    parse(word).ok_or_else(|| format!("a number is wanted, not {}", shown(word)))?
-            }
-            None if i < least => {
-                return Err(format!("{least} numbers are wanted, and there are {i}"));
-            }
-            None => break,
-        }
-    }
-    Ok(numbers)
-}
-
-/// The index from 0 that `part` of `word` says, of `count` things called `kind`.
-fn index(part: &[u8], count: usize, kind: &str, word: &[u8]) -> OfLine<u32> {
-    let said: i64 = parse(part).ok_or_else(|| malformed(word))?;
-    let length = i64::try_from(count).unwrap_or(i64::MAX);
-    let index = if said > 0 {
-        said - 1
-    } else {
-        said.saturating_add(length)
-    };
-    if said == 0 || !(0..length).contains(&index) {
-        return Err(format!(
-            "{kind} {said} is out of range; {count} stand before this line"
-        ));
-    }
-    u32::try_from(index)
-        .ok()
-        .filter(|&i| i != NONE)
-        .ok_or_else(|| format!("{kind} {said} is beyond 32 bits"))
-}
-
-fn malformed(word: &[u8]) -> String {
-    format!(
-        "a corner is wanted, such as 1 or 1/2/3, not {}",
-        shown(word)
-    )
-}
-
-fn parse<T: std::str::FromStr>(word: &[u8]) -> Option<T> {
-    std::str::from_utf8(word).ok()?.parse().ok()
-}
-
-fn shown(word: &[u8]) -> String {
-    format!("{:?}", String::from_utf8_lossy(&word[..word.len().min(32)]))
 }
 
 #[cfg(test)]
@@ -421,6 +321,52 @@ mod tests {
         assert!(said[1].contains("1 lines Kd passed over"), "{said:?}");
         assert!(said[2].contains("no library has the material"), "{said:?}");
         assert!(said[2].contains("dark blue"), "{said:?}");
+    }
+
+    #[test]
+    fn a_file_is_understood_alike_however_it_is_cut() {
+        let face = |i: i32| {
+            let v = format!(
+                "v {i} 0.5 -1e-3 # {i}\nvt 0.{i} 1\nvn 0 {i} 1\n  usemtl m{}\n",
+                i % 7
+            );
+            v + &match i % 5 {
+                0 => format!("f {0}/{0}/{0} \\\n -2/-2/-1 -1//-1\n", i + 1),
+                1 => "f -1 -2 -3 \\\r\n-4\r\n".to_owned(),
+                2 => "f -1 1\n".to_owned(),
+                _ => format!("f 1/1/1 {0}/{0}/{0} 3/-1/-1", i + 1) + "\n\n",
+            }
+        };
+        let good: String = "v 0 0 0\nv 1 0 0\nv 2 0 0\nvt 0 0\nvn 0 0 1\n".to_owned()
+            + &(0..300).map(face).collect::<String>();
+        for text in [
+            good.clone(),
+            good.trim_end().to_owned(),
+            good.replace("0.299 1", "0.299 x"),
+            good.replace("f -1 1\n", "f -999 1\n"),
+        ] {
+            let read = |cuts| {
+                let input = Input {
+                    path: Path::new("cut.obj"),
+                    length: text.len() as u64,
+                    reader: &mut text.as_bytes(),
+                };
+                let decoded = read_in(cuts, input, &ReadOptions::default());
+                decoded
+                    .map(|decoded| (decoded.mesh, decoded.warnings))
+                    .map_err(|e| e.to_string())
+            };
+            let whole = read(CUTS);
+            assert_eq!(
+                whole.is_ok(),
+                text.len() >= good.trim_end().len()
+                    && !text.contains('x')
+                    && !text.contains("999 ")
+            );
+            for (block, piece) in [(1, 1), (40, 10), (1000, 100), (5000, 5000)] {
+                assert!(read(Cuts { block, piece }) == whole, "{block} {piece}");
+            }
+        }
     }
 
     #[test]
