@@ -167,7 +167,7 @@ fn picture(picture: &Picture) -> Value {
 }
 
 /// An object for people: a line a value, what is nested further to the right.
-fn print(value: &Value, level: usize) {
+pub(super) fn print(value: &Value, level: usize) {
     let Value::Object(object) = value else {
         return;
     };

@@ -9,6 +9,7 @@ mod check;
 mod compare;
 mod crosscheck;
 mod info;
+mod mesh;
 mod relight;
 mod render;
 
@@ -45,6 +46,7 @@ enum Command {
     Compare(Box<compare::Arguments>),
     Crosscheck(Box<crosscheck::Arguments>),
     Info(info::Arguments),
+    Mesh(mesh::Arguments),
     Relight(relight::Arguments),
     /// Étendue's side of a crosscheck, which starts it: answers orders on standard input
     #[command(hide = true)]
@@ -62,6 +64,7 @@ pub(crate) fn run() -> ExitCode {
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Crosscheck(arguments) => crosscheck::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
+        Command::Mesh(arguments) => mesh::run(&arguments),
         Command::Relight(arguments) => relight::run(&arguments),
         Command::CrosscheckWorker => crosscheck::serve(),
     };

@@ -77,6 +77,28 @@ pub(super) fn positive(text: &str) -> Parsed<f64> {
     Ok(number)
 }
 
+/// A number of things: `1000`, `250k`, `10M`.
+pub(super) fn count(text: &str) -> Parsed<u32> {
+    const HOW: &str = "write it as 5000, 250k or 10M";
+    /// Of what 32 bits number, with room for what goes with it.
+    const MOST: f64 = 4e9;
+    let end = text.find(|c: char| !(c.is_ascii_digit() || c == '.'));
+    let (number, unit) = text.split_at(end.unwrap_or(text.len()));
+    let factor = match unit {
+        "" => 1.0,
+        "k" => 1e3,
+        "M" => 1e6,
+        "G" => 1e9,
+        _ => return Err(HOW.to_owned()),
+    };
+    let number: f64 = number.parse().map_err(|_| HOW)?;
+    let count = (number * factor).round();
+    if !(1.0..=MOST).contains(&count) {
+        return Err(format!("{text} is not between 1 and {MOST}"));
+    }
+    Ok(count as u32)
+}
+
 /// A number of bytes: `500M`, `8G`, `7.5GiB`; `none` is without limit.
 pub(super) fn bytes(text: &str) -> Parsed<u64> {
     if text == "none" {
@@ -218,6 +240,16 @@ mod tests {
         assert_eq!(bytes("none"), Ok(u64::MAX));
         for wrong in ["", "G", "8X", "1.2.3M", "-1"] {
             assert!(bytes(wrong).is_err(), "{wrong:?}");
+        }
+    }
+
+    #[test]
+    fn counts_have_units_and_bounds() {
+        assert_eq!(count("7"), Ok(7));
+        assert_eq!(count("250k"), Ok(250_000));
+        assert_eq!(count("1.5M"), Ok(1_500_000));
+        for wrong in ["", "M", "0", "-1", "5G", "1m", "1.2.3k", "1e6"] {
+            assert!(count(wrong).is_err(), "{wrong:?}");
         }
     }
 

@@ -7,7 +7,7 @@ use ::image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use ::image::{ExtendedColorType, ImageEncoder};
 
 use crate::error::{Error, Result};
-use crate::image::file;
+use crate::file;
 use crate::image::format::Format;
 
 /// The channels of an 8-bit image.

@@ -4,7 +4,6 @@
 
 mod buffer;
 mod codes;
-mod file;
 mod format;
 mod jpeg;
 mod metadata;
@@ -24,6 +23,7 @@ pub use metadata::{MetaValue, Metadata, Window};
 pub use view::View;
 
 use crate::error::{Error, Location, Result};
+use crate::file;
 use format::Decoder;
 
 /// What the values of a picture mean.

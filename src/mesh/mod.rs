@@ -8,27 +8,40 @@
 //! with the turned faces; `face_normals` drops the vertex normals ([`Mesh::drop_normals`]);
 //! `flip_normals` turns geometric and vertex normals over ([`Mesh::flip_normals`]).
 
+mod displace;
 mod generate;
 mod gltf;
 mod mtl;
 mod normals;
 mod obj;
+mod parts;
 mod ply;
 mod read;
+mod refine;
+mod report;
 mod serialized;
 mod source;
 mod stl;
 #[cfg(test)]
 mod tests;
+mod weld;
 
 use glam::{DMat4, DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
-pub use generate::{bumpy_sphere, cube, grid, hair, rectangle, sphere, terrain};
+pub use displace::Seams;
+pub use generate::{
+    Bumps, add_bumps, ball, block, bumpy_sphere, cube, flake, flake_balls, flake_scene, grid, hair,
+    menger, menger_triangles, rectangle, sphere, terrain,
+};
 pub use gltf::{GltfCamera, GltfPart, GltfScene, Projection, read_gltf};
 pub use mtl::BARE_COLOR;
+pub use parts::{Part, Parts, read_parts};
+pub use ply::{check_writable, write_ply, write_text};
 pub use read::{FORMATS, Format, Loaded, MeshFile, ReadMesh, ReadOptions, extension, read};
 pub(crate) use read::{contents, is_compressed};
+pub use refine::TooMany;
+pub use report::Report;
 
 /// Triangles over shared vertices.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -57,6 +70,13 @@ pub struct Attribute {
     pub per: Per,
     /// Rows of `channels` numbers.
     pub values: Vec<f32>,
+}
+
+impl Attribute {
+    /// The numbers of a vertex or face.
+    pub fn row(&self, i: usize) -> &[f32] {
+        &self.values[i * self.channels..(i + 1) * self.channels]
+    }
 }
 
 /// What an [`Attribute`] belongs to.

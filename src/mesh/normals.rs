@@ -16,6 +16,15 @@ const NOWHERE: Vec3 = Vec3::X;
 
 /// A unit normal a vertex. The sums are taken in the order of the triangles, whatever the threads.
 pub(super) fn angle_weighted(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Vec3> {
+    shared(positions, triangles, |vertex| vertex)
+}
+
+/// The same, of vertices that count as one where `first` gives the same vertex, the first of them.
+pub(super) fn shared(
+    positions: &[Vec3],
+    triangles: &[[u32; 3]],
+    first: impl Fn(u32) -> u32 + Sync,
+) -> Vec<Vec3> {
     let mut sums = vec![Vec3::ZERO; positions.len()];
     let mut shares = Vec::new();
     // The angles are the work, and are found in parallel for some triangles at a time; the sums follow.
@@ -28,13 +37,16 @@ pub(super) fn angle_weighted(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<
             .collect_into_vec(&mut shares);
         for (triangle, share) in triangles.iter().zip(&shares) {
             for (&vertex, &normal) in triangle.iter().zip(share) {
-                sums[vertex as usize] += normal;
+                sums[first(vertex) as usize] += normal;
             }
         }
     }
     sums.par_iter_mut()
         .with_min_len(GRAIN)
         .for_each(|n| *n = unit_or(n.as_dvec3(), NOWHERE));
+    for vertex in 0..sums.len() {
+        sums[vertex] = sums[first(vertex as u32) as usize];
+    }
     sums
 }
 

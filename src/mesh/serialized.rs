@@ -41,6 +41,19 @@ pub(super) fn read(input: Input<'_>, options: &ReadOptions) -> Result<Decoded> {
     })
 }
 
+/// All meshes of the file, in its order.
+pub(super) fn read_all(input: Input<'_>) -> Result<Vec<Mesh>> {
+    let place = Location::of_file(input.path);
+    let bytes = input.bytes()?;
+    let located = |message| Error::input(message).at(&place);
+    // Of a broken file the first says what is wrong; each takes four bytes of the table at least.
+    let said = bytes.last_chunk().map_or(1, |&n| u32::from_le_bytes(n));
+    let most = u32::try_from(bytes.len() / 4).unwrap_or(u32::MAX);
+    (0..said.clamp(1, most.max(1)) as usize)
+        .map(|index| read_shape(&bytes, index).map_err(located))
+        .collect()
+}
+
 /// What is read, or what is wrong, in words.
 type OrWhy<T> = std::result::Result<T, String>;
 

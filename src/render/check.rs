@@ -46,7 +46,8 @@ impl Task for Check<'_> {
             let view = problems.take(prepare::view::<C>(description, sensor.node_id()));
             warnings.extend(view.into_iter().flat_map(|view| view.warnings));
         }
-        match problems.take(prepare::load(description, None, self.progress)) {
+        let limit = self.options.memory_limit;
+        match problems.take(prepare::load(description, None, limit, self.progress)) {
             Some(assets) => {
                 warnings.extend_from_slice(assets.warnings());
                 problems.take(scene::build(description, &assets, color, Method::Brute));

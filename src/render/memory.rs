@@ -60,6 +60,12 @@ pub(super) fn trees(primitives: u64) -> u64 {
     primitives.saturating_mul(TREE)
 }
 
+/// How many triangles so many bytes have room for, with their vertices and trees.
+pub(super) fn triangles(bytes: u64) -> u64 {
+    // A mesh has half as many vertices as triangles.
+    bytes / (TREE + TRIANGLE + VERTEX / 2)
+}
+
 impl Estimate {
     /// By what the scene's files announce; the film's share is left out.
     pub(super) fn of_files(description: &Description) -> Self {

@@ -166,15 +166,19 @@ pub(super) fn view<C: ColorModel>(description: &Description, sensor: NodeId) -> 
     })
 }
 
-/// Loads the shapes but for the mesh that is `given`.
+/// Loads the shapes but for the mesh that is `given`, and displaces those that want it as far as the `limit` on bytes
+/// allows.
 pub(super) fn load(
     description: &Description,
     given: Option<ReadMesh>,
+    limit: Option<u64>,
     progress: &dyn Progress,
 ) -> Result<Assets> {
     let shapes = description.root().children(Kind::Shape).len();
     progress.begin(Phase::Load, shapes as u64);
-    Assets::load(description, given, &|| progress.advance(1, 0))
+    let mut assets = Assets::load(description, given, &|| progress.advance(1, 0))?;
+    assets.displace(description, limit.map(memory::triangles))?;
+    Ok(assets)
 }
 
 /// What the view says of the work to come.
@@ -214,14 +218,17 @@ fn make<C: ColorModel>(
         ..Estimate::of_files(description)
     };
     announced.check(options.memory_limit)?;
-    let assets =
-        timed(&mut seconds.load, || load(description, given, progress)).map_err(|error| {
-            // What is wrong with materials is told along with what is wrong with shapes.
-            let mut problems = Problems::default();
-            problems.push(error);
-            problems.take(scene::check_materials(description, color.clone()));
-            problems.finish().expect_err("shapes have problems")
-        })?;
+    let assets = timed(&mut seconds.load, || {
+        let limit = options.memory_limit.map(|limit| limit.saturating_sub(film));
+        load(description, given, limit, progress)
+    })
+    .map_err(|error| {
+        // What is wrong with materials is told along with what is wrong with shapes.
+        let mut problems = Problems::default();
+        problems.push(error);
+        problems.take(scene::check_materials(description, color.clone()));
+        problems.finish().expect_err("shapes have problems")
+    })?;
     let primitives = assets.primitive_count();
     let loaded = Estimate {
         film,

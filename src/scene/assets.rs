@@ -25,7 +25,7 @@ pub struct Assets {
     /// In file order.
     pub(super) shapes: Vec<Member>,
     pub(super) instances: Vec<Instance>,
-    warnings: Vec<Problem>,
+    pub(super) warnings: Vec<Problem>,
 }
 
 /// A shape with its place.

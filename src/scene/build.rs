@@ -107,8 +107,9 @@ impl<C: ColorModel> Builder<'_, C> {
             .flatten();
         let own = self.problems.take(properties.child(Kind::Bsdf)).flatten();
         let bsdf = own.or_else(|| Some(self.description.node(member.bsdf?)));
-        for user in emitter.iter().chain(&bsdf) {
-            self.check_attributes(properties, geometry, user);
+        let displacement = properties.peek_children(Kind::Texture);
+        for user in emitter.into_iter().chain(bsdf).chain(displacement) {
+            self.check_attributes(properties, geometry, &user);
         }
         let light = match &emitter {
             Some(emitter) if emitter.plugin() != "area" => {

@@ -4,6 +4,7 @@
 mod assets;
 mod build;
 mod choice;
+mod displacement;
 mod files;
 
 use glam::{Vec2, Vec3};

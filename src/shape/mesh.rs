@@ -41,6 +41,11 @@ impl TriangleMesh {
         &self.mesh
     }
 
+    /// The triangles, without what was made for light samples.
+    pub(super) fn into_mesh(self) -> Mesh {
+        self.mesh
+    }
+
     /// A triangle's corners.
     #[inline]
     pub fn corners(&self, triangle: u32) -> [Vec3; 3] {

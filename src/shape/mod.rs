@@ -7,6 +7,7 @@ mod mesh;
 mod plane;
 mod quad;
 mod sphere;
+mod tessellate;
 
 mod cone;
 mod cube;
@@ -34,6 +35,7 @@ pub use frustum::Frustum;
 pub use mesh::TriangleMesh;
 pub use plane::Plane;
 pub use sphere::Sphere;
+pub use tessellate::Untessellated;
 
 /// An axis-aligned box.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 /// The modules from the ground up. Those in one row are siblings and do not import each other.
 const LAYERS: &[&[&str]] = &[
     &["error"],
-    &["math"],
+    &["file", "math"],
     &["color"],
     &["description", "image", "mesh"],
     &["family", "interaction"],

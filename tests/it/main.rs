@@ -12,6 +12,7 @@ mod golden;
 mod inputs;
 mod layers;
 mod lights;
+mod mesh;
 mod mitsuba_data;
 mod phong;
 mod resume;

@@ -7,7 +7,7 @@ use std::array::from_fn;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
-use crate::math::{Frame, random, warp};
+use crate::math::{Frame, random};
 use crate::mesh::Mesh;
 
 /// Pieces of a strand, of two triangles each.
@@ -48,10 +48,9 @@ pub fn hair(triangles: u32, seed: u64) -> Mesh {
 fn grow(vertices: &mut [Vec3], key: u64) {
     let mut numbers = (0..).map(|i| random::unit(random::bits(key, i)));
     let mut next = || numbers.next().unwrap_or_default();
-    let mut direction = warp::uniform_sphere(Vec2::new(next(), next()));
+    let mut direction = on_sphere(&mut next);
     let mut middle = direction;
-    let around = warp::concentric_disk(Vec2::new(next(), next()));
-    let mut width = Frame::around(direction).to_world(around.extend(0.0));
+    let mut width = on_sphere(&mut next);
     for pair in vertices.chunks_exact_mut(2) {
         // At right angles to the strand, as near to the width before as that allows.
         width = Frame::along(direction, width).s * HALF_WIDTH;
@@ -59,6 +58,18 @@ fn grow(vertices: &mut [Vec3], key: u64) {
         middle += LENGTH * direction;
         let turn = Vec3::from_array(from_fn(|_| 2.0 * next() - 1.0));
         direction = (direction + CURL * turn).normalize();
+    }
+}
+
+/// A direction, uniformly (Marsaglia, *Choosing a point from the surface of a sphere*, 1972): it needs no sine, of which
+/// every system has another.
+fn on_sphere(next: &mut impl FnMut() -> f32) -> Vec3 {
+    loop {
+        let p = 2.0 * Vec2::new(next(), next()) - 1.0;
+        let squared = p.length_squared();
+        if squared < 1.0 {
+            return (2.0 * (1.0 - squared).sqrt() * p).extend(1.0 - 2.0 * squared);
+        }
     }
 }
 

@@ -1,7 +1,11 @@
 //! Meshes without a file: Mitsuba's `rectangle` and `cube`, a parametrised sphere, a grid of heights, and of
-//! any size, for tests and benches, a closed bumpy sphere, a terrain and hair.
+//! any size, a closed bumpy sphere, a terrain, hair, a sphere flake, a Menger sponge, and balls, blocks and bumps.
 
+mod flake;
 mod hair;
+mod menger;
+mod noise;
+mod shapes;
 mod terrain;
 
 use std::collections::HashMap;
@@ -10,7 +14,10 @@ use std::f64::consts::PI;
 use glam::{DVec2, DVec3, Vec2, Vec3};
 use rand::RngExt;
 
+pub use flake::{flake, flake_balls, flake_scene};
 pub use hair::hair;
+pub use menger::{menger, menger_triangles};
+pub use shapes::{Bumps, add_bumps, ball, block};
 pub use terrain::terrain;
 
 use super::Mesh;
@@ -59,8 +66,10 @@ pub fn cube() -> Mesh {
 pub fn sphere(around: u32, down: u32) -> Mesh {
     let (around, down) = (around.max(3), down.max(2));
     let mut mesh = patch(around, down, |uv| {
-        let (sin_phi, cos_phi) = (2.0 * PI * uv.x).sin_cos();
+        // At the seam and at the lower pole the same places, to the bit.
+        let (sin_phi, cos_phi) = (2.0 * PI * uv.x.fract()).sin_cos();
         let (sin_theta, cos_theta) = (PI * uv.y).sin_cos();
+        let sin_theta = if uv.y < 1.0 { sin_theta } else { 0.0 };
         DVec3::new(sin_theta * cos_phi, sin_theta * sin_phi, cos_theta)
     });
     // Of a cell at a pole one triangle has no area, and v runs down: the outside is on the other side.

@@ -12,8 +12,13 @@ use crate::mesh::Mesh;
 const AMPLITUDE: f64 = 0.2;
 /// Lattice cells of the first octave in a unit of length.
 const FREQUENCY: f64 = 2.0;
-/// Radians from one octave to the next.
-const TURN: f64 = 0.6;
+/// By 0.6 rad from one octave to the next. Not computed, for no two systems have the same cosine.
+const TURN: DMat2 = DMat2::from_cols_array(&[
+    0.825_335_614_909_678_3,
+    0.564_642_473_395_035_4,
+    -0.564_642_473_395_035_4,
+    0.825_335_614_909_678_3,
+]);
 
 /// Hills over [−1, 1]², seen from +Z, with heights z in ±0.4: a square grid of about `triangles` triangles (two a
 /// cell; at least one cell), whose smallest hills are a few cells wide. `seed` chooses the hills. No
@@ -54,7 +59,7 @@ fn flat(cells: u32, cell: impl Fn(u32) -> [[u32; 3]; 2] + Sync) -> Vec<[u32; 3]>
 }
 
 fn height(p: DVec2, keys: &[u64]) -> f64 {
-    let turn_and_shrink = 2.0 * DMat2::from_angle(TURN);
+    let turn_and_shrink = 2.0 * TURN;
     let (mut sum, mut amplitude, mut p) = (0.0, AMPLITUDE, FREQUENCY * p);
     for &key in keys {
         sum += amplitude * noise(p, key);

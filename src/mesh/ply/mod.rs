@@ -6,6 +6,7 @@
 mod attributes;
 mod header;
 mod rows;
+mod write;
 
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
@@ -17,6 +18,8 @@ use crate::error::Result;
 use attributes::Plan;
 use header::{Element, Encoding, Header, Kind, Scalar};
 use rows::{Column, Rows};
+
+pub use write::{check_writable, write_ply, write_text};
 
 /// Rows that are written out at a time where they are not of fixed size.
 const ROWS: u64 = 1 << 10;

@@ -3,7 +3,7 @@
 //! was one, is untouched and nothing new is left behind.
 
 use std::fs::{self, File};
-use std::io::Write;
+use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use tempfile::NamedTempFile;
@@ -11,11 +11,25 @@ use tempfile::NamedTempFile;
 use crate::error::{Error, Result};
 
 /// Writes `bytes` as the file `path`.
-pub(super) fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
+pub(crate) fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
+    stream_atomically(path, |file| file.write_all(bytes))
+}
+
+/// Writes the file `path` piece by piece, as `write` does it.
+pub(crate) fn stream_atomically(
+    path: &Path,
+    write: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
+) -> Result<()> {
+    /// Bytes handed to the system at a time.
+    const BUFFER: usize = 1 << 18;
     let target = resolve(path)?;
     let refused = |cause: &std::io::Error| Error::system("write", path, cause);
     let mut file = temporary_beside(&target).map_err(|e| refused(&e))?;
-    file.write_all(bytes).map_err(|e| refused(&e))?;
+    let mut buffer = BufWriter::with_capacity(BUFFER, file.as_file_mut());
+    write(&mut buffer)
+        .and_then(|()| buffer.flush())
+        .map_err(|e| refused(&e))?;
+    drop(buffer);
     file.as_file().sync_all().map_err(|e| refused(&e))?;
     file.persist(&target).map_err(|e| refused(&e.error))?;
     // The new name must reach the disk too. Some file systems cannot sync a folder; the file itself is
@@ -27,7 +41,7 @@ pub(super) fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
 }
 
 /// Finds out, without leaving anything behind, whether `path` could be written.
-pub(super) fn check_writable(path: &Path) -> Result<()> {
+pub(crate) fn check_writable(path: &Path) -> Result<()> {
     let target = resolve(path)?;
     temporary_beside(&target)
         .map(drop)
@@ -97,7 +111,11 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.exr");
         write_atomically(&path, b"first, and longer").unwrap();
-        write_atomically(&path, b"second").unwrap();
+        stream_atomically(&path, |file| {
+            file.write_all(b"sec")?;
+            file.write_all(b"ond")
+        })
+        .unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"second");
         assert_eq!(entries(folder.path()), ["a.exr"]);
     }
@@ -121,10 +139,17 @@ mod tests {
             for error in [
                 check_writable(path).unwrap_err(),
                 write_atomically(path, b"new").unwrap_err(),
+                stream_atomically(path, |_| Ok(())).unwrap_err(),
             ] {
                 assert!(error.to_string().contains(message), "{error}");
             }
         }
+        let full = std::io::Error::from(std::io::ErrorKind::StorageFull);
+        let stopped = stream_atomically(&folder.path().join("new.exr"), |file| {
+            file.write_all(b"half")?;
+            Err(full)
+        });
+        assert!(stopped.is_err());
         assert_eq!(fs::read(&read_only).unwrap(), b"old");
         assert_eq!(entries(folder.path()), ["locked.exr", "sub.exr"]);
     }
