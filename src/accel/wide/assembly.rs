@@ -55,17 +55,12 @@ struct Place<'t> {
 
 impl Place<'_> {
     /// The heads, and the items that are no triangles.
-    fn fill(
-        self,
-        sketch: &Sketch,
-        boxes: &[Bounds],
-        leaves: &impl Leaves,
-    ) -> (Vec<Head>, Vec<u32>) {
+    fn fill(self, sketch: &Sketch, leaves: &impl Leaves) -> (Vec<Head>, Vec<u32>) {
         let Self { before, nodes, .. } = self;
         let mut others = Vec::new();
         let mut blocks = (before.blocks..).zip(self.blocks);
         let child = |items: &[u32]| {
-            let boxes = items.iter().map(|item| boxes[*item as usize]);
+            let boxes = items.iter().map(|item| leaves.bounds(*item));
             let bounds = boxes.fold(Bounds::EMPTY, Bounds::union);
             if let [item] = items
                 && !leaves.is_triangle(*item)
@@ -88,7 +83,7 @@ impl Place<'_> {
 
 impl Sketches {
     /// The tree, and the items that are no triangles, in the order of their names.
-    pub(super) fn tree(&self, boxes: &[Bounds], leaves: &impl Leaves) -> (Tree, Vec<u32>) {
+    pub(super) fn tree(&self, leaves: &impl Leaves) -> (Tree, Vec<u32>) {
         let counts = (self.parts.par_iter()).map(|sketch| Count::of(sketch, leaves));
         let counts: Vec<Count> = counts.collect();
         // The root comes first, what is left of the top last.
@@ -133,7 +128,7 @@ impl Sketches {
         });
         let places: Vec<Place<'_>> = places.collect();
         let filled = (places.into_par_iter().zip(&self.parts))
-            .map(|(place, sketch)| place.fill(sketch, boxes, leaves));
+            .map(|(place, sketch)| place.fill(sketch, leaves));
         let (heads, others): (Vec<Vec<Head>>, Vec<Vec<u32>>) = filled.unzip();
         let (heads, others) = (heads.concat(), others.concat());
         let mut levels = heads[0].levels;

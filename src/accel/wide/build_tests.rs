@@ -89,7 +89,7 @@ fn a_tree_in_chunks_costs_no_more_than_one_tree() {
         for work in [Build::Fast, Build::Medium] {
             let [one, chunked] = [usize::MAX, 4096].map(|most| {
                 let sketches = build::build_in(most, &boxes, &leaves, work);
-                cost(&sketches.tree(&boxes, &leaves).0)
+                cost(&sketches.tree(&leaves).0)
             });
             assert!(
                 chunked < 1.01 * one,
@@ -125,7 +125,7 @@ fn every_triangle_stands_in_one_chunk_and_one_block() {
     items.sort_unstable();
     assert!(items.into_iter().eq(0..boxes.len() as u32));
     let sketches = build::build_in(1000, &boxes, &leaves, Build::Fast);
-    let (tree, _) = sketches.tree(&boxes, &leaves);
+    let (tree, _) = sketches.tree(&leaves);
     let ids = tree.blocks.iter().flat_map(|block| block.ids);
     let mut ids: Vec<u32> = ids.filter(|id| *id != u32::MAX).collect();
     ids.sort_unstable();

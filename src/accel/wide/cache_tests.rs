@@ -152,7 +152,7 @@ fn whatever_is_made_up_is_no_tree_or_one_of_all_items() {
         };
         accepted += 1;
         assert!(read == made_up);
-        let (tree, others) = read.tree(&boxes, &leaves);
+        let (tree, others) = read.tree(&leaves);
         let ids = tree.blocks.iter().flat_map(|block| block.ids);
         let items: HashSet<u32> = ids.filter(|id| *id != u32::MAX).chain(others).collect();
         assert_eq!(items.len(), 9000, "change {i}");

@@ -112,7 +112,8 @@ impl Tree {
             Some(folder) => cache::through(folder, &boxes, leaves, work),
             None => (build::build(&boxes, leaves, work), CacheUse::default()),
         };
-        let (tree, others) = sketches.tree(&boxes, leaves);
+        drop(boxes); // before the nodes take memory
+        let (tree, others) = sketches.tree(leaves);
         (tree, others, used)
     }
 
