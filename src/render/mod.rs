@@ -11,8 +11,10 @@ mod blocks;
 mod check;
 mod checkpoint;
 mod fingerprint;
+mod heat;
 mod info;
 mod memory;
+mod pinned;
 mod plan;
 mod prepare;
 mod samples;
@@ -33,6 +35,7 @@ use crate::integrator::Stats;
 pub use adaptive::AdaptiveReport;
 pub use bare::{UpAxis, describe_mesh, is_mesh};
 pub use check::check;
+pub use heat::Heat;
 pub use info::{NamedFile, SceneInfo, SensorInfo};
 pub use memory::human_bytes;
 pub use options::{Adaptive, Checkpoint, Colors, Options, Overrides};
@@ -96,6 +99,23 @@ pub struct Seconds {
     pub build: f64,
     /// Tracing and shading.
     pub render: f64,
+    /// Of rendering, the seconds of all threads in the tracer, for camera rays and bounces.
+    pub closest: f64,
+    /// And for shadow rays.
+    pub occluded: f64,
+    /// Of rendering, the seconds of all threads in cameras, materials and lights.
+    pub shade: f64,
+    /// Of rendering, the seconds of all threads in making pixels of samples.
+    pub film: f64,
+}
+
+impl Seconds {
+    fn spend(&mut self, times: &sums::Times) {
+        self.closest = times.closest;
+        self.occluded = times.occluded;
+        self.shade = times.shade;
+        self.film = times.film;
+    }
 }
 
 /// Renders a single image: see [`Session::render`].
