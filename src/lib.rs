@@ -36,3 +36,4 @@ pub mod integrator;
 pub mod render;
 
 pub mod crosscheck;
+pub mod profile;

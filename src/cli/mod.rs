@@ -9,10 +9,12 @@ mod check;
 mod compare;
 mod crosscheck;
 mod info;
+mod profile;
 mod relight;
 mod render;
 
 mod batch;
+mod growth;
 mod memory;
 mod output;
 mod parse;
@@ -45,6 +47,7 @@ enum Command {
     Compare(Box<compare::Arguments>),
     Crosscheck(Box<crosscheck::Arguments>),
     Info(info::Arguments),
+    Profile(Box<profile::Arguments>),
     Relight(relight::Arguments),
     /// Étendue's side of a crosscheck, which starts it: answers orders on standard input
     #[command(hide = true)]
@@ -62,6 +65,7 @@ pub(crate) fn run() -> ExitCode {
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Crosscheck(arguments) => crosscheck::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
+        Command::Profile(arguments) => profile::run(&arguments),
         Command::Relight(arguments) => relight::run(&arguments),
         Command::CrosscheckWorker => crosscheck::serve(),
     };

@@ -6,8 +6,8 @@ use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
 use etendue::accel::{Build, Method};
-use etendue::description::{self, Description, Value};
 use etendue::compare::map::{Map, robust_top};
+use etendue::description::{self, Description, Value};
 use etendue::display;
 use etendue::error::{Error, Problem, Result};
 use etendue::image;
@@ -253,9 +253,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     }
     let stop = Stop::on_signals()?;
     let Batch { items, failed } = arguments.batch()?;
-    output::check_distinct(
-        (items.iter()).flat_map(|i| i.files().map(|file| (file, i.name()))),
-    )?;
+    output::check_distinct((items.iter()).flat_map(|i| i.files().map(|file| (file, i.name()))))?;
     let wanted = items.iter().filter(|item| !arguments.skips(item));
     output::check_writable(wanted.flat_map(Item::files))?;
     let mut series = Series {

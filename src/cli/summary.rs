@@ -180,7 +180,10 @@ fn stats(report: &Report) {
             format!("{:.3} ({rate:.2} M rays/s)", report.seconds.render),
         ),
         ("thread seconds: trace", share(report.seconds.closest)),
-        ("                shadow rays", share(report.seconds.occluded)),
+        (
+            "                shadow rays",
+            share(report.seconds.occluded),
+        ),
         ("                shade", share(report.seconds.shade)),
         ("                film", share(report.seconds.film)),
     ] {

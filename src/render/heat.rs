@@ -51,7 +51,9 @@ pub(super) fn count<C: ColorModel>(job: &Job<'_, C>, progress: &dyn Progress) ->
     node_steps.resize(width * height, 0.0);
     progress.begin(Phase::Render, u64::from(samples) * (width * height) as u64);
     let stats = Mutex::new(Stats::default());
-    let rows = node_steps.par_chunks_exact_mut(width).zip(crop.y..crop.y + crop.height);
+    let rows = node_steps
+        .par_chunks_exact_mut(width)
+        .zip(crop.y..crop.y + crop.height);
     rows.for_each(|(row, y)| {
         if progress.stop() {
             return;
@@ -66,7 +68,10 @@ pub(super) fn count<C: ColorModel>(job: &Job<'_, C>, progress: &dyn Progress) ->
             of_row.add(&counted);
         }
         progress.advance(u64::from(samples) * width as u64, of_row.rays());
-        stats.lock().expect("no thread panics while it adds").add(&of_row);
+        stats
+            .lock()
+            .expect("no thread panics while it adds")
+            .add(&of_row);
     });
     Ok(Heat {
         width,

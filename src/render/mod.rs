@@ -25,7 +25,7 @@ mod unit;
 
 use std::time::{Duration, Instant};
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::description::Description;
 use crate::error::{Problem, Result};
@@ -39,6 +39,7 @@ pub use heat::Heat;
 pub use info::{NamedFile, SceneInfo, SensorInfo};
 pub use memory::human_bytes;
 pub use options::{Adaptive, Checkpoint, Colors, Options, Overrides};
+pub(crate) use pinned::pin;
 pub use plan::Completed;
 pub use progress::{Phase, Progress, Silent};
 pub use session::Session;
@@ -91,7 +92,7 @@ pub struct Report {
 }
 
 /// Wall-clock seconds by phase.
-#[derive(Clone, Copy, Debug, Default, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Seconds {
     /// Reading meshes.
     pub load: f64,
@@ -110,6 +111,31 @@ pub struct Seconds {
 }
 
 impl Seconds {
+    /// Adds another render's.
+    pub fn add(&mut self, other: &Self) {
+        self.load += other.load;
+        self.build += other.build;
+        self.render += other.render;
+        self.closest += other.closest;
+        self.occluded += other.occluded;
+        self.shade += other.shade;
+        self.film += other.film;
+    }
+
+    /// A part of them: the mean of so many renders where they are a sum.
+    #[must_use]
+    pub fn divided(&self, by: f64) -> Self {
+        Self {
+            load: self.load / by,
+            build: self.build / by,
+            render: self.render / by,
+            closest: self.closest / by,
+            occluded: self.occluded / by,
+            shade: self.shade / by,
+            film: self.film / by,
+        }
+    }
+
     fn spend(&mut self, times: &sums::Times) {
         self.closest = times.closest;
         self.occluded = times.occluded;

@@ -2,7 +2,7 @@
 //! around. For measuring only; a render is faster where the system may move its threads.
 
 /// Keeps the calling thread, a pool's number `index`, on one processor, where the system allows it.
-pub(super) fn pin(index: usize) {
+pub(crate) fn pin(index: usize) {
     #[cfg(target_os = "linux")]
     {
         use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
