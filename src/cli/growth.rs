@@ -19,7 +19,6 @@ pub(super) fn print(profile: &Profile, comparison: Option<&Comparison>) {
     for series in &profile.series {
         self::series(series);
     }
-    limits(profile);
     verdicts(profile);
     if let Some(comparison) = comparison {
         changes(comparison);
@@ -27,7 +26,7 @@ pub(super) fn print(profile: &Profile, comparison: Option<&Comparison>) {
     for note in &profile.notes {
         line(&format!("note: {note}"));
     }
-    noise(profile);
+    facts(profile);
 }
 
 fn series(series: &Series) {
@@ -109,45 +108,13 @@ fn growth(series: &Series, growth: &Growth) -> String {
     format!("{:18} ≈ {law}{foretold}{from}", growth.quantity.name())
 }
 
-fn limits(profile: &Profile) {
+fn facts(profile: &Profile) {
     line("");
-    if let Some(crossover) = &profile.crossover {
-        let at = |x: Option<f64>| {
-            x.map_or("not within these sizes".to_owned(), |x| {
-                format!("{x:.0} triangles")
-            })
-        };
-        line(&format!(
-            "the tree is faster than brute force from {}",
-            at(crossover.tracing)
-        ));
-        line(&format!(
-            "  with its build, for {} rays, from {}",
-            crossover.rays,
-            at(crossover.with_build)
-        ));
+    for fact in profile.facts() {
+        line(&fact);
     }
-    if let Some([geometry, tree]) = profile.bytes_per_triangle {
-        line(&format!(
-            "bytes a triangle: geometry {geometry:.1}, tree {tree:.1}"
-        ));
-    }
-    for scaling in &profile.scaling {
-        let phase = scaling.phase.name().trim_end_matches(", s");
-        let [low, high] = scaling.interval;
-        let mut text = format!(
-            "{phase} with {} threads: {:.2}× [{low:.2}, {high:.2}]",
-            scaling.threads, scaling.speedup
-        );
-        if let (Some(efficiency), Some(serial)) = (scaling.efficiency, scaling.serial) {
-            text += &format!(
-                ", {:.0} % of the arithmetic loop's {:.2}×; serial part {:.1} %",
-                100.0 * efficiency,
-                profile.noise.gain,
-                100.0 * serial
-            );
-        }
-        line(&text);
+    if let Some(warning) = profile.noise.warning() {
+        line(&format!("warning: {warning}; times are not judged"));
     }
 }
 
@@ -190,27 +157,6 @@ fn changes(comparison: &Comparison) {
             change.old,
             change.new,
             change.ratio
-        ));
-    }
-}
-
-fn noise(profile: &Profile) {
-    let noise = &profile.noise;
-    let waiting = noise.waiting.map_or(String::new(), |part| {
-        format!(", {:.1} % of it waiting", 100.0 * part)
-    });
-    line("");
-    line(&format!(
-        "noise: {} arithmetic loops of {:.1} ms spread over {:.1} %{waiting}; {} threads do {:.2}× as much as one",
-        noise.loops,
-        1e3 * noise.seconds,
-        100.0 * noise.spread,
-        noise.threads,
-        noise.gain
-    ));
-    if let Some(warning) = noise.warning() {
-        line(&format!(
-            "warning: {warning}; verdicts on times are withheld"
         ));
     }
 }

@@ -133,7 +133,7 @@ impl Pair<'_> {
             let ratio = new / old;
             (ratio, apart && (ratio - 1.0).abs() > LEAST)
         };
-        changed.then(|| Change {
+        changed.then_some(Change {
             axis: self.series.axis,
             way: self.series.way,
             x: self.point.x,

@@ -13,6 +13,7 @@ mod subject;
 mod sweep;
 mod verdict;
 
+mod chart;
 mod compare;
 mod csv;
 mod html;

@@ -60,6 +60,12 @@ impl Quantity {
         }
     }
 
+    /// The same without its unit.
+    pub fn bare_name(self) -> &'static str {
+        let name = self.name();
+        name.split_once(',').map_or(name, |(bare, _)| bare)
+    }
+
     /// Whether it is counted, so that it is exact and the same everywhere.
     pub fn is_count(self) -> bool {
         use Quantity::{FirstTests, NodeSteps, Rays, ShadowRays, ShadowTests, StepsPerRay};

@@ -351,7 +351,7 @@ impl Extent {
                 .chain(self.exhaustible())
                 .map(|n| of(&brute, n))
                 .collect(),
-            &[(Q::FirstTests, Power), (Q::Trace, Power)],
+            &[(Q::FirstTests, Power), (Q::TracePerRay, Power)],
             128.0,
         );
         let mut sizes = self.small();

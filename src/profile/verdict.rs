@@ -78,7 +78,7 @@ pub(super) fn all(series: &[Series], noise: &Noise) -> Vec<Verdict> {
             "object loop, brute force",
             Axis::Objects,
             Way::Brute,
-            Q::Trace,
+            Q::TracePerRay,
             1.0,
         ),
         judge.logarithm(),
@@ -171,7 +171,7 @@ impl Judge<'_> {
         let fit = self.along(axis, way)?.growth(quantity, Model::Power)?.fit;
         let of = match quantity.is_count() {
             true => quantity.name().to_owned(),
-            false => format!("time ({})", quantity.name().trim_end_matches(", s")),
+            false => format!("time ({})", quantity.bare_name()),
         };
         Some(Verdict {
             subject: subject.to_owned(),
