@@ -18,7 +18,7 @@ pub(super) struct Chart {
 #[derive(Clone, Debug)]
 pub(super) struct Scale {
     pub(super) label: String,
-    /// `s` where values are seconds, `ns`, or nothing.
+    /// `s` or `ns` where values are times, else nothing.
     pub(super) unit: &'static str,
     pub(super) logarithmic: bool,
 }
@@ -57,7 +57,7 @@ const STYLE: &str = "\
 .plot text{font:12px system-ui,sans-serif;fill:#24292f}.plot .title{font-weight:600;font-size:13px}\
 .plot .ground{fill:#ffffff}.plot .grid{stroke:#8884;stroke-width:1}.plot .frame{stroke:#888;fill:none}\
 .plot .c0{stroke:#3b82d6;fill:#3b82d6}.plot .c1{stroke:#d9772b;fill:#d9772b}.plot .c2{stroke:#2f9e63;fill:#2f9e63}\
-.plot .c3{stroke:#9a63d1;fill:#9a63d1}.plot polyline{fill:none;stroke-width:1.5}\
+.plot .c3{stroke:#9a63d1;fill:#9a63d1}.plot .line{fill:none;stroke-width:1.5}\
 @media(prefers-color-scheme:dark){.plot text{fill:#d6dae0}.plot .ground{fill:#16191e}}";
 
 impl Chart {
@@ -97,13 +97,13 @@ impl Chart {
                 let line: Vec<String> = line.map(|(px, py)| format!("{px:.1},{py:.1}")).collect();
                 let _ = write!(
                     out,
-                    r#"<polyline class="{color}" clip-path="url(#inside)" {dash} points="{}"/>"#,
+                    r#"<polyline class="{color} line" clip-path="url(#inside)" {dash} points="{}"/>"#,
                     line.join(" ")
                 );
                 let at = row + LINE * (j + 1) as f64;
                 let _ = write!(
                     out,
-                    r#"<polyline class="{color}" {dash} points="{},{y} {},{y}"/><text x="{}" y="{}">{}</text>"#,
+                    r#"<polyline class="{color} line" {dash} points="{},{y} {},{y}"/><text x="{}" y="{}">{}</text>"#,
                     LEFT + 14.0,
                     LEFT + 38.0,
                     LEFT + 46.0,
@@ -276,10 +276,15 @@ fn short(value: f64, unit: &str) -> String {
     if value == 0.0 {
         return "0".to_owned();
     }
+    let (value, unit) = if unit == "ns" {
+        (1e-9 * value, "s")
+    } else {
+        (value, unit)
+    };
     let fits = |prefix: &&(f64, &str)| value >= 0.9999 * prefix.0;
-    let (scale, prefix) = match unit {
-        "ns" => (1.0, ""),
-        _ => *PREFIXES.iter().find(fits).unwrap_or(&PREFIXES[6]),
+    let (scale, prefix) = match PREFIXES.iter().find(fits) {
+        _ if unit.is_empty() && value < 1.0 => (1.0, ""),
+        found => *found.unwrap_or(&PREFIXES[6]),
     };
     let text = format!("{:.2}", value / scale);
     let text = text.trim_end_matches('0').trim_end_matches('.');
@@ -371,6 +376,8 @@ mod tests {
             (65_536.0, "", "65.54k"),
             (1e6, "", "1M"),
             (250.0, "ns", "250 ns"),
+            (2e5, "ns", "200 µs"),
+            (0.5, "", "0.5"),
             (0.0, "s", "0"),
         ] {
             assert_eq!(short(value, unit), text);

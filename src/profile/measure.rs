@@ -87,7 +87,7 @@ pub fn run(settings: &Settings, watch: &dyn Watch) -> Result<Option<Profile>> {
         effort: settings.effort,
         threads: settings.threads.get(),
         own: stage.own_triangles(),
-        most: most_triangles(settings.memory_limit, &mut notes),
+        most: most_triangles(settings, &mut notes),
     };
     let sweeps = if stage.is_scalable() {
         extent.sweeps()
@@ -147,9 +147,10 @@ pub fn run(settings: &Settings, watch: &dyn Watch) -> Result<Option<Profile>> {
 }
 
 /// The most triangles that fit into memory.
-fn most_triangles(limit: Option<u64>, notes: &mut Vec<String>) -> u32 {
+fn most_triangles(settings: &Settings, notes: &mut Vec<String>) -> u32 {
+    let limit = settings.memory_limit;
     let fit = limit.map_or(u64::MAX, |bytes| bytes / BYTES_A_TRIANGLE);
-    if fit < 10_000_000 {
+    if fit < settings.effort.largest().into() {
         notes.push(format!(
             "sizes end at {fit} triangles, for which memory suffices"
         ));

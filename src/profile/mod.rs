@@ -146,3 +146,6 @@ impl Profile {
         self.series.iter().find(wanted)
     }
 }
+
+#[cfg(test)]
+mod tests;

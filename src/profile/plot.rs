@@ -2,7 +2,7 @@
 
 use super::chart::{Chart, Curve, Scale, Spot};
 use super::fit::{median, median_interval};
-use super::{Axis, Fit, Model, Profile, Quantity, Series};
+use super::{Axis, Fit, Model, Profile, Quantity, Series, Way};
 
 /// A chart by its name.
 #[derive(Clone, Debug)]
@@ -107,7 +107,7 @@ const PLANS: [Plan; 9] = [
         ("threads-render", Axis::Threads),
         "Rendering by threads",
         (Quantity::Render, "s"),
-        [false; 2],
+        [true, false],
         &[],
     ),
 ];
@@ -146,6 +146,9 @@ impl Profile {
 }
 
 fn curve(series: &Series, plan: &Plan) -> Option<Curve> {
+    if plan.quantity == Quantity::Build && series.way == Way::Brute {
+        return None; // there is nothing to build
+    }
     let observed = series.observed(plan.quantity, 0.0);
     let spots = observed.iter().map(|o| Spot {
         x: o.x,
@@ -154,7 +157,6 @@ fn curve(series: &Series, plan: &Plan) -> Option<Curve> {
     });
     let points: Vec<Spot> = spots.filter(|spot| spot.y > 0.0).collect();
     let fit = |model: &Model| {
-        // Brute force is timed over all of its rays; a ray's share grows alike.
         let growth = series.growth(plan.quantity, *model)?;
         Some((law(series.axis, &growth.fit), growth.fit, growth.from))
     };

@@ -257,7 +257,7 @@ impl Place {
     fn scene(&self, mesh: &Path, setting: &Setting) -> String {
         let (right, front) = self.axes();
         let eye = self.center
-            + 1.9 * self.radius * (0.25 * right - 0.8 * front + 0.75 * self.up).normalize();
+            + 1.5 * self.radius * (0.25 * right - 0.8 * front + 0.75 * self.up).normalize();
         let height = self.height(setting.look);
         let room = match setting.look {
             Look::Room => format!(

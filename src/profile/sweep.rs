@@ -103,6 +103,16 @@ pub enum Effort {
 }
 
 impl Effort {
+    /// The most triangles.
+    pub(super) fn largest(self) -> u32 {
+        match self {
+            Self::Tiny => 4_096,
+            Self::Quick => 256 << 10,
+            Self::Usual => 1 << 20,
+            Self::Full => 10_000_000,
+        }
+    }
+
     fn pick<T>(self, quick: T, usual: T) -> T {
         match self {
             Self::Tiny | Self::Quick => quick,
@@ -238,13 +248,7 @@ impl Extent {
 
     /// The sizes of the tree.
     fn sizes(&self) -> Vec<u32> {
-        let largest = match self.effort {
-            Effort::Tiny => 4_096,
-            Effort::Quick => 256 << 10,
-            Effort::Usual => 1 << 20,
-            Effort::Full => 10_000_000,
-        };
-        let largest = largest.min(self.most);
+        let largest = self.effort.largest().min(self.most);
         let mut sizes: Vec<u32> = match self.own {
             None => (0..12).map(|i| 1024 << (2 * i).min(20)).collect(),
             // Parts of the mesh, all of it, and cut in four as often as it goes.
@@ -269,7 +273,7 @@ impl Extent {
     /// Sizes so small that brute force may be as fast.
     fn small(&self) -> Vec<u32> {
         let most = self.own.unwrap_or(u32::MAX);
-        [2, 8, 32, 128].into_iter().filter(|n| *n <= most).collect()
+        [2, 8, 32].into_iter().filter(|n| *n <= most).collect()
     }
 
     /// Sizes for brute force to be fitted over.
@@ -277,7 +281,7 @@ impl Extent {
         let most = self.own.unwrap_or(u32::MAX);
         let last = match self.effort {
             Effort::Tiny => 9,
-            Effort::Quick => 12,
+            Effort::Quick => 11,
             Effort::Usual | Effort::Full => 13,
         };
         (7..=last).map(|i| 1 << i).filter(|n| *n <= most).collect()
@@ -387,6 +391,7 @@ impl Extent {
         };
         let few = Setting {
             triangles: brute.triangles / 2,
+            size: self.square(self.effort.pick(48, 64)),
             ..brute.clone()
         };
         let seen = Setting {
@@ -418,6 +423,7 @@ impl Extent {
         let room = Setting {
             look: Look::Room,
             depth: Some(6),
+            size: self.square(self.effort.pick(96, 128)),
             ..seen.clone()
         };
         self.others(&room, &mut add);
@@ -501,7 +507,7 @@ impl Extent {
         add(Axis::Bands, Way::Tree, colored.to_vec(), &growth, 0.0);
         let spp = |i: u32| Setting {
             spp: 1 << i,
-            size: self.square(64),
+            size: self.square(self.effort.pick(48, 64)),
             ..base.clone()
         };
         let rays = [(Q::Rays, Power), (Q::Render, Power)];

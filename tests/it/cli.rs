@@ -108,6 +108,7 @@ fn help_reads_as_it_was_blessed() {
         ("info", &["info", "--help"]),
         ("relight", &["relight", "--help"]),
         ("crosscheck", &["crosscheck", "--help"]),
+        ("profile", &["profile", "--help"]),
     ] {
         let output = Command::new(env!("CARGO_BIN_EXE_etendue"))
             .args(arguments)
