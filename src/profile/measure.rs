@@ -64,6 +64,11 @@ impl Effort {
         }
     }
 
+    /// Seconds of one arithmetic loop.
+    fn of_a_loop(self) -> f64 {
+        if self == Self::Tiny { 1e-3 } else { 0.06 }
+    }
+
     /// Seconds below which a render is made several times.
     fn least(self) -> f64 {
         match self {
@@ -109,7 +114,7 @@ pub fn run(settings: &Settings, watch: &dyn Watch) -> Result<Option<Profile>> {
         stage: &mut stage,
         watch,
         session: Session::default(),
-        loops: Loops::new(settings.threads.get()),
+        loops: Loops::new(settings.threads.get(), settings.effort.of_a_loop()),
         series: sweeps.iter().map(empty).collect(),
         sweeps: &sweeps,
         begin,

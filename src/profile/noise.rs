@@ -13,8 +13,6 @@ use serde::{Deserialize, Serialize};
 use super::fit::median;
 use crate::render::pin;
 
-/// Seconds of one loop.
-const LOOP: f64 = 0.06;
 /// A wider spread of the loop's times is too noisy.
 const MOST_SPREAD: f64 = 0.04;
 /// A larger part of the time without a processor is too noisy.
@@ -70,15 +68,15 @@ pub(super) struct Loops {
 }
 
 impl Loops {
-    /// Finds out how long a loop must be.
-    pub(super) fn new(threads: usize) -> Self {
+    /// Finds out how long a loop must be to take so many seconds.
+    pub(super) fn new(threads: usize, seconds: f64) -> Self {
         const TRIAL: u64 = 1 << 20;
         let fastest = (0..5)
             .map(|_| one(TRIAL).seconds)
             .fold(f64::INFINITY, f64::min);
         Self {
             threads,
-            iterations: (TRIAL as f64 * LOOP / fastest.max(1e-6)) as u64,
+            iterations: (TRIAL as f64 * seconds / fastest.max(1e-6)) as u64,
             one: Vec::new(),
             all: Vec::new(),
             shares: Vec::new(),
@@ -222,10 +220,7 @@ mod tests {
 
     #[test]
     fn the_loops_take_turns_and_are_counted() {
-        let mut loops = Loops {
-            iterations: 1000,
-            ..Loops::new(2)
-        };
+        let mut loops = Loops::new(2, 1e-3);
         for _ in 0..3 {
             loops.run();
         }

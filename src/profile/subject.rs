@@ -176,7 +176,8 @@ impl Stage {
                 text += "</scene>";
                 overrides.integrator = setting.look.integrator().map(str::to_owned);
                 overrides.max_depth = setting.depth.map(i64::from);
-                Description::parse(&text, path, options)?
+                // The text has a name of its own: a file that includes itself is refused.
+                Description::parse(&text, &path.with_extension("profiled"), options)?
             }
             _ => {
                 let (path, place) = self.mesh(setting.triangles)?;
