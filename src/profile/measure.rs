@@ -5,9 +5,10 @@
 use std::num::NonZeroUsize;
 use std::time::Instant;
 
+use super::axis::{Axis, Effort};
 use super::noise::Loops;
 use super::subject::{Stage, Subject};
-use super::sweep::{Axis, Effort, Extent, Setting, Sweep};
+use super::sweep::{Extent, Setting, Sweep};
 use super::{FORMAT, Fit, Growth, Point, Profile, Series, scaling, verdict};
 use crate::accel::Build;
 use crate::error::{Error, Result};

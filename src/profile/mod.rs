@@ -4,10 +4,12 @@
 //! Counts are the same on every machine; times are medians with intervals, and verdicts on them are withheld where
 //! the machine is too noisy.
 
+mod axis;
 mod fit;
 mod measure;
 mod noise;
 mod quantity;
+mod resize;
 mod scaling;
 mod subject;
 mod sweep;
@@ -16,6 +18,7 @@ mod verdict;
 mod chart;
 mod compare;
 mod csv;
+mod facts;
 mod html;
 mod plot;
 
@@ -24,6 +27,7 @@ use serde::{Deserialize, Serialize};
 use crate::integrator::Stats;
 use crate::render::Seconds;
 
+pub use axis::{Axis, Effort, Way};
 pub use compare::{Change, Comparison};
 pub use fit::{Fit, Model, Observed, median, median_interval};
 pub use measure::{Settings, Watch, run};
@@ -32,7 +36,6 @@ pub use plot::Plot;
 pub use quantity::Quantity;
 pub use scaling::{Crossover, Scaling};
 pub use subject::Subject;
-pub use sweep::{Axis, Effort, Way};
 pub use verdict::{Outcome, Verdict};
 
 /// The version of [`Profile`] as JSON.

@@ -1,125 +1,10 @@
 //! Which renders a profile makes: along each axis of the cost model T = O(P·O·L·N/3), by brute force and by tree,
 //! one quantity grows while all others stay.
 
-use std::fmt;
-use std::str::FromStr;
-
-use serde::{Deserialize, Serialize};
-
+use super::axis::{Axis, Effort, Way};
 use super::fit::Model;
 use super::quantity::Quantity;
 use crate::accel::Method;
-
-/// What grows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Axis {
-    /// P
-    Pixels,
-    /// O
-    Objects,
-    /// L
-    Lights,
-    /// N
-    Bands,
-    /// Samples a pixel.
-    Samples,
-    /// The longest path.
-    Depth,
-    /// Processors at work.
-    Threads,
-}
-
-impl Axis {
-    /// In the order of the report.
-    pub const ALL: [Self; 7] = [
-        Self::Pixels,
-        Self::Objects,
-        Self::Lights,
-        Self::Bands,
-        Self::Samples,
-        Self::Depth,
-        Self::Threads,
-    ];
-
-    /// As on the command line and on plots.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Pixels => "P",
-            Self::Objects => "O",
-            Self::Lights => "L",
-            Self::Bands => "N",
-            Self::Samples => "samples",
-            Self::Depth => "depth",
-            Self::Threads => "threads",
-        }
-    }
-
-    /// What stands along it.
-    pub fn label(self) -> &'static str {
-        match self {
-            Self::Pixels => "pixels P",
-            Self::Objects => "triangles O",
-            Self::Lights => "lights L",
-            Self::Bands => "bands N (3 is RGB)",
-            Self::Samples => "samples a pixel",
-            Self::Depth => "longest path",
-            Self::Threads => "threads",
-        }
-    }
-}
-
-impl fmt::Display for Axis {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
-
-impl FromStr for Axis {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let named = |axis: &Self| axis.name().eq_ignore_ascii_case(text);
-        Self::ALL.into_iter().find(named).ok_or_else(|| {
-            let names = Self::ALL.map(Self::name).join(", ");
-            format!("there is no axis {text:?}; there are {names}")
-        })
-    }
-}
-
-/// How much a profile takes on.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Effort {
-    /// The least that can be fitted: for tests.
-    Tiny,
-    /// Under fifteen seconds.
-    Quick,
-    /// Under two minutes.
-    #[default]
-    Usual,
-    /// Up to ten million triangles.
-    Full,
-}
-
-impl Effort {
-    /// The most triangles.
-    pub(super) fn largest(self) -> u32 {
-        match self {
-            Self::Tiny => 4_096,
-            Self::Quick => 256 << 10,
-            Self::Usual => 1 << 20,
-            Self::Full => 10_000_000,
-        }
-    }
-
-    fn pick<T>(self, quick: T, usual: T) -> T {
-        match self {
-            Self::Tiny | Self::Quick => quick,
-            Self::Usual | Self::Full => usual,
-        }
-    }
-}
 
 /// How light is gathered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -163,6 +48,12 @@ pub(super) struct Setting {
     pub(super) look: Look,
 }
 
+impl Setting {
+    fn with_triangles(self, triangles: u32) -> Self {
+        Self { triangles, ..self }
+    }
+}
+
 /// Renders along one axis.
 #[derive(Clone, Debug)]
 pub(super) struct Sweep {
@@ -178,25 +69,15 @@ pub(super) struct Sweep {
     pub(super) from: f64,
 }
 
-/// In which way a sweep is rendered.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Way {
-    /// Every ray is held against everything, without an early end.
-    Brute,
-    /// By tree.
-    Tree,
-    /// By tree, with a shadow ray to one light chosen at random in place of all.
-    One,
-}
-
-impl Way {
-    /// As in tables.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Brute => "brute force",
-            Self::Tree => "tree",
-            Self::One => "tree, one light",
+impl Sweep {
+    fn new(axis: Axis, way: Way, settings: Vec<Setting>, fitted: &[(Quantity, Model)]) -> Self {
+        Self {
+            axis,
+            way,
+            settings,
+            fresh: false,
+            fitted: fitted.to_vec(),
+            from: 0.0,
         }
     }
 }
@@ -213,6 +94,9 @@ pub(super) struct Extent {
     pub(super) most: u32,
 }
 
+/// The least tree whose steps are fitted: below, all of it is a node or two.
+const LEAST: u32 = 1000;
+
 use Model::{Line, Logarithm, Power};
 use Quantity as Q;
 
@@ -227,23 +111,35 @@ impl Extent {
         wanted.min(self.most).min(self.own.unwrap_or(u32::MAX))
     }
 
-    /// Squares whose areas double from one to the next.
-    fn squares(&self, first: f64) -> impl Iterator<Item = [u32; 2]> {
-        let count = self.effort.pick(5, 6);
-        let first = if self.effort == Effort::Tiny {
-            8.0
-        } else {
-            first
+    /// Square films whose areas double from one to the next.
+    fn squares(&self, of: &Setting, first: f64) -> Vec<Setting> {
+        let first = match self.effort {
+            Effort::Tiny => 8.0,
+            _ => first,
         };
-        (0..count).map(move |i| [(first * 2.0_f64.powf(f64::from(i) / 2.0)).round() as u32; 2])
+        let side = |i: u32| (first * 2.0_f64.powf(f64::from(i) / 2.0)).round() as u32;
+        let sized = |i| Setting {
+            size: [side(i); 2],
+            ..of.clone()
+        };
+        (0..self.effort.pick(5, 6)).map(sized).collect()
+    }
+
+    /// Lights whose number doubles from one to the next.
+    fn lit(&self, of: &Setting, look: Look) -> Vec<Setting> {
+        let lit = |i: u32| Setting {
+            lights: 1 << i,
+            look,
+            ..of.clone()
+        };
+        (0..=self.effort.pick(5, 6)).map(lit).collect()
     }
 
     fn square(&self, side: u32) -> [u32; 2] {
-        [if self.effort == Effort::Tiny {
-            12
-        } else {
-            side
-        }; 2]
+        match self.effort {
+            Effort::Tiny => [12; 2],
+            _ => [side; 2],
+        }
     }
 
     /// The sizes of the tree.
@@ -261,9 +157,9 @@ impl Extent {
         if self.effort == Effort::Full && self.own.is_none() {
             sizes.push(10_000_000);
         }
-        sizes.retain(|n| (500..=largest).contains(n));
+        sizes.retain(|n| (LEAST..=largest).contains(n));
         if self.effort == Effort::Tiny {
-            sizes.extend([600, 2_000]);
+            sizes.push(2_000);
         }
         sizes.sort_unstable();
         sizes.dedup();
@@ -313,122 +209,42 @@ impl Extent {
 
     /// All sweeps over a subject whose triangles can be chosen.
     pub(super) fn sweeps(&self) -> Vec<Sweep> {
-        let (base, brute) = (self.base(), self.brute());
-        let mut all = Vec::new();
-        let side = self.effort.pick(64.0, 128.0);
-        let mut add = |axis, way, settings: Vec<Setting>, fitted: &[(Q, Model)], from| {
-            all.push(Sweep {
-                axis,
-                way,
-                settings,
-                fresh: matches!(axis, Axis::Objects | Axis::Threads) && way == Way::Tree,
-                fitted: fitted.to_vec(),
-                from,
-            });
-        };
-        let sized = |of: &Setting, size| Setting { size, ..of.clone() };
-        add(
-            Axis::Pixels,
-            Way::Brute,
-            self.squares(self.effort.pick(32.0, 48.0))
-                .map(|s| sized(&brute, s))
-                .collect(),
-            &[(Q::FirstTests, Power), (Q::Render, Power)],
-            0.0,
-        );
-        add(
-            Axis::Pixels,
-            Way::Tree,
-            self.squares(side).map(|s| sized(&base, s)).collect(),
-            &[(Q::NodeSteps, Power), (Q::Render, Power)],
-            0.0,
-        );
-        let of = |of: &Setting, triangles| Setting {
-            triangles,
-            ..of.clone()
-        };
-        add(
-            Axis::Objects,
-            Way::Brute,
-            self.small()
-                .into_iter()
-                .chain(self.exhaustible())
-                .map(|n| of(&brute, n))
-                .collect(),
-            &[(Q::FirstTests, Power), (Q::TracePerRay, Power)],
-            128.0,
-        );
-        let mut sizes = self.small();
-        sizes.extend(self.exhaustible());
-        sizes.retain(|n| *n < 1000);
-        sizes.extend(self.sizes());
-        add(
-            Axis::Objects,
-            Way::Tree,
-            sizes.into_iter().map(|n| of(&base, n)).collect(),
-            &[
-                (Q::StepsPerRay, Logarithm),
-                (Q::StepsPerRay, Power),
-                (Q::TracePerRay, Logarithm),
-                (Q::TracePerRay, Power),
-                (Q::Build, Power),
-                (Q::Load, Power),
-            ],
-            if self.effort == Effort::Tiny {
-                500.0
-            } else {
-                900.0
-            },
-        );
-        let last = self.effort.pick(5, 6);
-        let lit = |of: &Setting, look| {
-            let lights = move |lights| Setting {
-                lights,
-                look,
-                ..of.clone()
-            };
-            (0..=last).map(|i| 1 << i).map(lights).collect::<Vec<_>>()
-        };
-        let few = Setting {
-            triangles: brute.triangles / 2,
-            size: self.square(self.effort.pick(48, 64)),
-            ..brute.clone()
-        };
         let seen = Setting {
             size: self.square(128),
-            ..base.clone()
+            ..self.base()
         };
-        let lights = [(Q::ShadowRays, Power), (Q::Shadows, Power)];
-        add(
-            Axis::Lights,
-            Way::Brute,
-            lit(&few, Look::AllLights),
-            &[(Q::ShadowTests, Power), (Q::Shadows, Power)],
-            0.0,
-        );
-        add(
-            Axis::Lights,
-            Way::Tree,
-            lit(&seen, Look::AllLights),
-            &lights,
-            0.0,
-        );
-        add(
-            Axis::Lights,
-            Way::One,
-            lit(&seen, Look::OneLight),
-            &lights,
-            0.0,
-        );
         let room = Setting {
             look: Look::Room,
             depth: Some(6),
             size: self.square(self.effort.pick(96, 128)),
             ..seen.clone()
         };
-        self.others(&room, &mut add);
-        all.retain(|sweep| self.axes.contains(&sweep.axis));
-        all
+        let few = Setting {
+            triangles: self.brute().triangles / 2,
+            size: self.square(self.effort.pick(48, 64)),
+            ..self.brute()
+        };
+        let by_shadow_tests = [(Q::ShadowTests, Power), (Q::Shadows, Power)];
+        let mut all = vec![
+            Sweep::new(
+                Axis::Pixels,
+                Way::Brute,
+                self.squares(&self.brute(), self.effort.pick(32.0, 48.0)),
+                &[(Q::FirstTests, Power), (Q::Render, Power)],
+            ),
+            self.pixels(&self.base(), self.effort.pick(64.0, 128.0)),
+            self.exhausted(),
+            self.grown(),
+            Sweep::new(
+                Axis::Lights,
+                Way::Brute,
+                self.lit(&few, Look::AllLights),
+                &by_shadow_tests,
+            ),
+        ];
+        all.extend(self.lights(&seen));
+        all.extend(self.others(&room));
+        self.chosen(all)
     }
 
     /// All sweeps over a scene as it is.
@@ -440,115 +256,131 @@ impl Extent {
             look: Look::Own,
             ..self.base()
         };
-        let mut all = Vec::new();
-        let mut add = |axis, way, settings: Vec<Setting>, fitted: &[(Q, Model)], from| {
-            all.push(Sweep {
-                axis,
-                way,
-                settings,
-                fresh: axis == Axis::Threads,
-                fitted: fitted.to_vec(),
-                from,
-            });
-        };
-        let side = self.effort.pick(64.0, 96.0);
-        add(
-            Axis::Pixels,
-            Way::Tree,
-            self.squares(side)
-                .map(|size| Setting {
-                    size,
-                    ..own.clone()
-                })
-                .collect(),
-            &[(Q::NodeSteps, Power), (Q::Render, Power)],
-            0.0,
-        );
-        let last = self.effort.pick(5, 6);
-        for (way, look) in [(Way::Tree, Look::AllLights), (Way::One, Look::OneLight)] {
-            let lit = |i: u32| Setting {
-                lights: 1 << i,
-                look,
-                depth: Some(2),
-                size: self.square(128),
-                spp: 1,
-                ..own.clone()
-            };
-            add(
-                Axis::Lights,
-                way,
-                (0..=last).map(lit).collect(),
-                &[(Q::ShadowRays, Power), (Q::Shadows, Power)],
-                0.0,
-            );
-        }
-        let small = Setting {
-            size: self.square(64),
-            spp: 4,
+        let seen = Setting {
+            depth: Some(2),
+            size: self.square(128),
+            spp: 1,
             ..own.clone()
         };
-        self.others(&small, &mut add);
+        let small = Setting {
+            size: self.square(64),
+            ..own.clone()
+        };
+        let mut all = vec![self.pixels(&own, self.effort.pick(64.0, 96.0))];
+        all.extend(self.lights(&seen));
+        all.extend(self.others(&small));
+        self.chosen(all)
+    }
+
+    /// Those along the axes that were asked for.
+    fn chosen(&self, mut all: Vec<Sweep>) -> Vec<Sweep> {
         all.retain(|sweep| self.axes.contains(&sweep.axis));
         all
     }
 
+    /// P, by tree.
+    fn pixels(&self, of: &Setting, first: f64) -> Sweep {
+        let fitted = [(Q::NodeSteps, Power), (Q::Render, Power)];
+        Sweep::new(Axis::Pixels, Way::Tree, self.squares(of, first), &fitted)
+    }
+
+    /// O, by brute force.
+    fn exhausted(&self) -> Sweep {
+        let sizes = self.small().into_iter().chain(self.exhaustible());
+        let fitted = [(Q::FirstTests, Power), (Q::TracePerRay, Power)];
+        let sized = sizes.map(|n| self.brute().with_triangles(n)).collect();
+        Sweep {
+            from: 128.0,
+            ..Sweep::new(Axis::Objects, Way::Brute, sized, &fitted)
+        }
+    }
+
+    /// O, by tree; of small sizes those that brute force has as well.
+    fn grown(&self) -> Sweep {
+        let mut sizes = self.small();
+        sizes.extend(self.exhaustible());
+        sizes.retain(|n| *n < LEAST);
+        sizes.extend(self.sizes());
+        let fitted = [
+            (Q::StepsPerRay, Logarithm),
+            (Q::StepsPerRay, Power),
+            (Q::TracePerRay, Logarithm),
+            (Q::TracePerRay, Power),
+            (Q::Build, Power),
+            (Q::Load, Power),
+        ];
+        let sized = sizes
+            .into_iter()
+            .map(|n| self.base().with_triangles(n))
+            .collect();
+        Sweep {
+            fresh: true,
+            from: match self.effort {
+                Effort::Tiny => 100.0,
+                // A generated mesh has about as many triangles as it should.
+                _ => 0.9 * f64::from(LEAST),
+            },
+            ..Sweep::new(Axis::Objects, Way::Tree, sized, &fitted)
+        }
+    }
+
+    /// L, by tree: all lights, and one of them.
+    fn lights(&self, of: &Setting) -> [Sweep; 2] {
+        let fitted = [(Q::ShadowRays, Power), (Q::Shadows, Power)];
+        [(Way::Tree, Look::AllLights), (Way::One, Look::OneLight)]
+            .map(|(way, look)| Sweep::new(Axis::Lights, way, self.lit(of, look), &fitted))
+    }
+
     /// The axes on which nothing but the render's own numbers grow.
-    fn others(
-        &self,
-        base: &Setting,
-        add: &mut impl FnMut(Axis, Way, Vec<Setting>, &[(Q, Model)], f64),
-    ) {
-        let bands = [None, Some(8), Some(16), Some(32)];
-        let colored = bands.map(|bands| Setting {
+    fn others(&self, of: &Setting) -> [Sweep; 4] {
+        let along = |axis, settings, fitted: &[_]| Sweep::new(axis, Way::Tree, settings, fitted);
+        let bands = [None, Some(8), Some(16), Some(32)].map(|bands| Setting {
             bands,
-            ..base.clone()
+            ..of.clone()
         });
-        let growth = [(Q::Render, Power), (Q::Render, Line), (Q::Shade, Power)];
-        add(Axis::Bands, Way::Tree, colored.to_vec(), &growth, 0.0);
-        let spp = |i: u32| Setting {
+        let samples = |i: u32| Setting {
             spp: 1 << i,
             size: self.square(self.effort.pick(48, 64)),
-            ..base.clone()
+            ..of.clone()
         };
-        let rays = [(Q::Rays, Power), (Q::Render, Power)];
-        add(
-            Axis::Samples,
-            Way::Tree,
-            (0..self.effort.pick(5, 6)).map(spp).collect(),
-            &rays,
-            0.0,
-        );
-        let deep = |i: u32| Setting {
+        let depth = |i: u32| Setting {
             depth: Some(1 << i),
-            ..base.clone()
+            ..of.clone()
         };
-        let deeper = (1..=self.effort.pick(4, 5)).map(deep).collect();
-        add(
-            Axis::Depth,
-            Way::Tree,
-            deeper,
-            &[(Q::Rays, Line), (Q::Render, Line)],
-            0.0,
-        );
         let mut counts: Vec<usize> = (0..16).map(|i| 1 << i).collect();
         counts.retain(|n| *n < self.threads);
         counts.push(self.threads);
-        let at_work = |threads| Setting {
+        let threads = |threads| Setting {
             threads,
-            spp: self.effort.pick(4, 16) * base.spp,
-            triangles: base
-                .triangles
-                .saturating_mul(self.effort.pick(4, 5))
-                .min(self.most),
-            ..base.clone()
+            spp: self.effort.pick(4, 16) * of.spp,
+            triangles: (of.triangles.saturating_mul(self.effort.pick(4, 5))).min(self.most),
+            ..of.clone()
         };
-        add(
-            Axis::Threads,
-            Way::Tree,
-            counts.into_iter().map(at_work).collect(),
-            &[],
-            0.0,
-        );
+        [
+            along(
+                Axis::Bands,
+                bands.to_vec(),
+                &[(Q::Render, Power), (Q::Render, Line), (Q::Shade, Power)],
+            ),
+            along(
+                Axis::Samples,
+                (0..self.effort.pick(5, 6)).map(samples).collect(),
+                &[(Q::Rays, Power), (Q::Render, Power)],
+            ),
+            along(
+                Axis::Depth,
+                (1..=self.effort.pick(4, 5)).map(depth).collect(),
+                &[(Q::Rays, Line), (Q::Render, Line)],
+            ),
+            Sweep {
+                fresh: true,
+                ..along(
+                    Axis::Threads,
+                    counts.into_iter().map(threads).collect(),
+                    &[],
+                )
+            },
+        ]
     }
 }
 
@@ -564,15 +396,6 @@ mod tests {
             own: None,
             most: u32::MAX,
         }
-    }
-
-    #[test]
-    fn axes_are_found_by_their_names() {
-        for axis in Axis::ALL {
-            assert_eq!(axis.name().parse(), Ok(axis));
-            assert_eq!(axis.name().to_lowercase().parse(), Ok(axis));
-        }
-        assert!("Q".parse::<Axis>().unwrap_err().contains("samples"));
     }
 
     #[test]

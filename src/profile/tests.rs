@@ -179,7 +179,7 @@ fn a_mesh_and_a_scene_are_profiled_as_well() {
     let mesh = of(path, &[Axis::Objects]);
     let tree = mesh.series(Axis::Objects, Way::Tree).unwrap();
     // Two triangles, cut in four again and again.
-    assert!(tree.points.iter().any(|p| p.primitives == 2 << 8));
+    assert!(tree.points.iter().any(|p| p.primitives == 2 << 10));
     assert!(tree.points.iter().all(|p| p.stats.shaded > 0));
     let path = folder.path().join("scene.xml");
     std::fs::write(

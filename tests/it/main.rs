@@ -14,5 +14,6 @@ mod layers;
 mod lights;
 mod mitsuba_data;
 mod phong;
+mod profile;
 mod resume;
 mod same_bits;
