@@ -134,28 +134,18 @@ fn verdicts(profile: &Profile) {
 fn changes(comparison: &Comparison) {
     line("");
     line(&format!(
-        "since version {}: {} of {} renders in common changed",
+        "since version {}: {}",
         comparison.version,
-        {
-            let mut places: Vec<_> = comparison
-                .changes
-                .iter()
-                .map(|c| (c.axis, c.way, c.x.to_bits()))
-                .collect();
-            places.dedup();
-            places.len()
-        },
-        comparison.common
+        comparison.summary()
     ));
     for change in &comparison.changes {
+        let [low, high] = change.interval;
         line(&format!(
-            "  {} · {} at {}: {} {:.4e} → {:.4e} (× {:.3})",
+            "  {} · {} at {}: {} × {:.4} [{low:.4}, {high:.4}]",
             change.axis,
             change.way.name(),
-            change.x,
-            change.quantity.name(),
-            change.old,
-            change.new,
+            change.place(),
+            change.quantity.bare_name(),
             change.ratio
         ));
     }

@@ -27,6 +27,8 @@ pub(super) struct Scale {
 #[derive(Clone, Debug)]
 pub(super) struct Curve {
     pub(super) label: String,
+    /// Which of the colours: 0 to 3.
+    pub(super) color: usize,
     pub(super) points: Vec<Spot>,
     /// Each with what the legend says of it, and where it begins.
     pub(super) fits: Vec<(String, Fit, f64)>,
@@ -84,8 +86,8 @@ impl Chart {
         let place =
             |px: f64, py: f64| (LEFT + WIDTH * x.part(px), TOP + HEIGHT * (1.0 - y.part(py)));
         let mut row = legend;
-        for (i, curve) in self.curves.iter().enumerate() {
-            let color = format!("c{}", i % 4);
+        for curve in &self.curves {
+            let color = format!("c{}", curve.color);
             for (j, (label, fit, from)) in curve.fits.iter().enumerate() {
                 let dash = DASHES[j % DASHES.len()];
                 let begin = x.low.max(*from);
@@ -315,6 +317,7 @@ mod tests {
             .map(|m| ("a < b".to_owned(), Fit::new(m, &observed).unwrap(), 0.0));
         let curve = Curve {
             label: "tree & all".to_owned(),
+            color: 1,
             points: values
                 .map(|(x, y)| Spot {
                     x,

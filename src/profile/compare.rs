@@ -1,10 +1,11 @@
-//! What changed since an older profile: counts exactly, times by their medians in parts of the arithmetic loop's
-//! on either machine, so that a faster processor alone changes nothing.
+//! What changed since an older profile: counts exactly, point by point; times in parts of the arithmetic loop's on
+//! either machine, so that a faster processor alone changes nothing, and a series at a time, since a single time
+//! of few rounds differs by chance.
 
 use serde::Serialize;
 
 use super::fit::{median, median_interval};
-use super::{Axis, FORMAT, Noise, Point, Profile, Quantity, Series, Way};
+use super::{Axis, FORMAT, Point, Profile, Quantity, Way};
 use crate::error::{Error, Result};
 
 /// Two profiles, point by point.
@@ -14,6 +15,8 @@ pub struct Comparison {
     pub version: String,
     /// Renders that both have.
     pub common: usize,
+    /// Whether times are compared: both machines were calm.
+    pub times: bool,
     /// What changed.
     pub changes: Vec<Change>,
 }
@@ -25,32 +28,64 @@ pub struct Change {
     pub axis: Axis,
     /// And way.
     pub way: Way,
-    /// The place on the axis.
-    pub x: f64,
+    /// The place on the axis; of times absent, for they are compared over all of it.
+    pub x: Option<f64>,
     /// What changed.
     pub quantity: Quantity,
-    /// Then; of times the median.
-    pub old: f64,
-    /// And now.
-    pub new: f64,
-    /// New in parts of old; of times, after each was divided by its own arithmetic loop.
+    /// New in parts of old; of times the median over the axis.
     pub ratio: f64,
+    /// The interval of that median.
+    pub interval: [f64; 2],
 }
 
-/// What is compared.
-const QUANTITIES: [Quantity; 9] = [
+impl Change {
+    /// Where on the axis.
+    pub fn place(&self) -> String {
+        self.x.map_or("all".to_owned(), |x| x.to_string())
+    }
+}
+
+impl Comparison {
+    /// How much is alike.
+    pub fn summary(&self) -> String {
+        let (counts, times): (Vec<_>, Vec<_>) = self
+            .changes
+            .iter()
+            .partition(|change| change.quantity.is_count());
+        let mut summary = format!(
+            "{} renders in common, {} counts of them changed",
+            self.common,
+            counts.len()
+        );
+        if self.times {
+            summary += &format!(
+                "; {} kinds of times changed over a whole series, in parts of either machine's arithmetic loop",
+                times.len()
+            );
+        } else {
+            summary += "; times are not compared, for one of the profiles is too noisy";
+        }
+        summary
+    }
+}
+
+/// Counts that are compared.
+const COUNTS: [Quantity; 5] = [
     Quantity::Rays,
     Quantity::ShadowRays,
     Quantity::FirstTests,
     Quantity::ShadowTests,
     Quantity::NodeSteps,
-    Quantity::Load,
-    Quantity::Build,
+];
+/// Times that are compared.
+const TIMES: [Quantity; 4] = [
     Quantity::Trace,
+    Quantity::Shade,
+    Quantity::Film,
     Quantity::Render,
 ];
-/// A smaller change of a time is not told.
-const LEAST: f64 = 0.05;
+/// A smaller change of times is not told.
+const LEAST: f64 = 0.03;
 
 impl Profile {
     /// Reads what was written as JSON.
@@ -77,70 +112,71 @@ impl Profile {
 
     /// What changed since `old`.
     pub fn since(&self, old: &Self) -> Comparison {
+        let calm = [self, old]
+            .iter()
+            .all(|profile| profile.noise.warning().is_none());
         let mut comparison = Comparison {
             version: old.version.clone(),
             common: 0,
+            times: calm,
             changes: Vec::new(),
         };
         for series in &self.series {
             let Some(before) = old.series(series.axis, series.way) else {
                 continue;
             };
-            for point in &series.points {
-                let alike = |p: &&Point| {
-                    p.x == point.x
-                        && (p.pixels, p.samples) == (point.pixels, point.samples)
-                        && (p.primitives, p.lights) == (point.primitives, point.lights)
+            let with_its_past = |point| {
+                let then = before.points.iter().find(|then| alike(then, point))?;
+                Some((then, point))
+            };
+            let pairs: Vec<_> = series.points.iter().filter_map(with_its_past).collect();
+            comparison.common += pairs.len();
+            let (axis, way) = (series.axis, series.way);
+            for (then, now) in &pairs {
+                comparison
+                    .changes
+                    .extend(COUNTS.iter().filter_map(|&quantity| {
+                        let [old, new] = [then, now].map(|point| median(&quantity.of(point)));
+                        let ratio = new / old;
+                        (new != old).then_some(Change {
+                            axis,
+                            way,
+                            x: Some(now.x),
+                            quantity,
+                            ratio,
+                            interval: [ratio; 2],
+                        })
+                    }));
+            }
+            let machine = old.noise.seconds / self.noise.seconds;
+            for quantity in TIMES.into_iter().filter(|_| calm) {
+                let ratio = |(then, now): &(&Point, &Point)| {
+                    machine * median(&quantity.of(now)) / median(&quantity.of(then))
                 };
-                let Some(then) = before.points.iter().find(alike) else {
-                    continue;
-                };
-                comparison.common += 1;
-                let pair = Pair {
-                    series,
-                    then,
-                    point,
-                };
-                let noises = [&old.noise, &self.noise];
-                let changes = QUANTITIES.iter().filter_map(|q| pair.change(*q, noises));
-                comparison.changes.extend(changes);
+                let ratios: Vec<f64> = pairs.iter().map(ratio).collect();
+                let interval = median_interval(&ratios);
+                let changed = interval[0] > 1.0 + LEAST || interval[1] < 1.0 - LEAST;
+                if changed && ratios.len() >= FEWEST {
+                    comparison.changes.push(Change {
+                        axis,
+                        way,
+                        x: None,
+                        quantity,
+                        ratio: median(&ratios),
+                        interval,
+                    });
+                }
             }
         }
         comparison
     }
 }
 
-struct Pair<'a> {
-    series: &'a Series,
-    then: &'a Point,
-    point: &'a Point,
-}
+/// The fewest points of a series over which times are compared.
+const FEWEST: usize = 4;
 
-impl Pair<'_> {
-    fn change(&self, quantity: Quantity, noises: [&Noise; 2]) -> Option<Change> {
-        let values = [self.then, self.point].map(|p| quantity.of(p));
-        let [old, new] = [&values[0], &values[1]].map(|v| median(v));
-        let (ratio, changed) = if quantity.is_count() {
-            (new / old, new != old)
-        } else {
-            let scaled = |i: usize| {
-                let by = noises[i].seconds;
-                let scaled: Vec<f64> = values[i].iter().map(|t| t / by).collect();
-                (median(&scaled), median_interval(&scaled))
-            };
-            let ((old, [old_low, old_high]), (new, [new_low, new_high])) = (scaled(0), scaled(1));
-            let apart = new_low > old_high || new_high < old_low;
-            let ratio = new / old;
-            (ratio, apart && (ratio - 1.0).abs() > LEAST)
-        };
-        changed.then_some(Change {
-            axis: self.series.axis,
-            way: self.series.way,
-            x: self.point.x,
-            quantity,
-            old,
-            new,
-            ratio,
-        })
-    }
+/// Whether two points are of one render.
+fn alike(a: &Point, b: &Point) -> bool {
+    let what = |p: &Point| (p.pixels, p.samples, p.primitives, p.lights, p.threads);
+    a.x == b.x && what(a) == what(b)
 }

@@ -11,6 +11,9 @@ impl Profile {
         let mut facts = Vec::new();
         if let Some(crossover) = &self.crossover {
             let at = |x: Option<f64>| match x {
+                Some(x) if crossover.least == x => {
+                    format!("at all sizes, {x:.0} triangles and more")
+                }
                 Some(x) => format!("from {x:.0} triangles on"),
                 None => "nowhere within these sizes".to_owned(),
             };

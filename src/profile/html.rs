@@ -12,7 +12,7 @@ const STYLE: &str = "\
 padding:0 1rem;color:#24292f;background:#fff}h1{font-size:1.5rem}h2{font-size:1.1rem;margin-top:2rem}\
 table{border-collapse:collapse;font-size:13px}td,th{padding:.2rem .7rem;text-align:right;\
 border-bottom:1px solid #8883}td:first-child,th:first-child,.words td,.words th{text-align:left}\
-.plots{display:flex;flex-wrap:wrap;gap:1rem}.plots svg{max-width:100%;height:auto;border:1px solid #8883;\
+.plots{display:flex;flex-wrap:wrap;gap:1rem;align-items:flex-start}.plots svg{max-width:100%;height:auto;border:1px solid #8883;\
 border-radius:6px}.yes{color:#1a7f45}.no{color:#c2410c}.open{color:#8a6d00}.warning{border-left:4px solid #d97706;\
 padding:.4rem 1rem;background:#d977061a}details{margin:.5rem 0}summary{cursor:pointer}.wide{overflow-x:auto}\
 @media(prefers-color-scheme:dark){body{color:#d6dae0;background:#0f1115}.yes{color:#4cc383}.no{color:#fb923c}\
@@ -117,24 +117,21 @@ intervals that hold them in 95 of 100 cases.</p>
 fn changes(page: &mut String, comparison: &Comparison) {
     let _ = writeln!(
         page,
-        "<h2>Since version {}</h2>\n<p>{} renders in common, {} changes. Times are in parts of either machine's \
-         arithmetic loop.</p>",
+        "<h2>Since version {}</h2>\n<p>{}.</p>",
         escaped(&comparison.version),
-        comparison.common,
-        comparison.changes.len()
+        escaped(&comparison.summary())
     );
-    *page += "<div class=\"wide\"><table><tr><th>series</th><th>x</th><th>quantity</th><th>then</th><th>now</th>\
-              <th>ratio</th></tr>\n";
+    *page += "<div class=\"wide\"><table><tr><th>series</th><th>x</th><th>quantity</th><th>now in parts of then\
+              </th></tr>\n";
     for change in &comparison.changes {
+        let [low, high] = change.interval;
         let _ = writeln!(
             page,
-            "<tr><td>{} · {}</td><td>{}</td><td>{}</td><td>{:.4e}</td><td>{:.4e}</td><td>{:.3}</td></tr>",
+            "<tr><td>{} · {}</td><td>{}</td><td>{}</td><td>{:.4} [{low:.4}, {high:.4}]</td></tr>",
             change.axis,
             change.way.name(),
-            change.x,
-            change.quantity.name(),
-            change.old,
-            change.new,
+            change.place(),
+            change.quantity.bare_name(),
             change.ratio
         );
     }

@@ -13,8 +13,8 @@ use serde::{Deserialize, Serialize};
 use super::fit::median;
 use crate::render::pin;
 
-/// A wider spread of the loop's times is too noisy.
-const MOST_SPREAD: f64 = 0.04;
+/// A wider spread of the loop's times is too noisy; a smaller one is what medians and intervals are for.
+const MOST_SPREAD: f64 = 0.15;
 /// A larger part of the time without a processor is too noisy.
 const MOST_WAITING: f64 = 0.03;
 

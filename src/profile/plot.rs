@@ -163,6 +163,11 @@ fn curve(series: &Series, plan: &Plan) -> Option<Curve> {
     let fits = plan.models.iter().filter_map(fit).collect();
     (points.len() >= 2).then(|| Curve {
         label: series.way.name().to_owned(),
+        color: match series.way {
+            Way::Brute => 0,
+            Way::Tree => 1,
+            Way::One => 2,
+        },
         points,
         fits,
     })

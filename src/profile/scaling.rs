@@ -17,6 +17,8 @@ pub struct Crossover {
     pub with_build: Option<f64>,
     /// How many rays.
     pub rays: u64,
+    /// The fewest triangles that were measured.
+    pub least: f64,
 }
 
 impl Crossover {
@@ -43,6 +45,7 @@ impl Crossover {
             tracing: crossing(&tracing),
             with_build: crossing(&with_build),
             rays,
+            least: tracing[0].0,
         })
     }
 }
