@@ -71,12 +71,13 @@ fn brute_force_costs_what_the_textbook_says_to_the_last_test() {
         }
     }
     assert!(seen > 10);
-    for verdict in profile
+    let counted = profile
         .verdicts
         .iter()
-        .filter(|v| v.subject.contains("counted"))
-    {
-        assert_eq!(verdict.outcome, Outcome::Confirmed, "{verdict:?}");
+        .filter(|v| v.subject.contains("counted"));
+    for (verdict, what) in counted.zip(["primary tests = P·O", "shadow tests = hits·L·O"]) {
+        let found = (verdict.outcome, &*verdict.predicted);
+        assert_eq!(found, (Outcome::Confirmed, what));
     }
 }
 
@@ -178,6 +179,12 @@ fn a_mesh_and_a_scene_are_profiled_as_well() {
     };
     let mesh = of(path, &[Axis::Objects]);
     let tree = mesh.series(Axis::Objects, Way::Tree).unwrap();
+    let counted = mesh
+        .verdicts
+        .iter()
+        .filter(|v| v.subject.contains("counted"));
+    let outcomes: Vec<_> = counted.map(|v| v.outcome).collect();
+    assert_eq!(outcomes, [Outcome::Confirmed; 2]);
     // Two triangles, cut in four again and again.
     assert!(tree.points.iter().any(|p| p.primitives == 2 << 10));
     assert!(tree.points.iter().all(|p| p.stats.shaded > 0));

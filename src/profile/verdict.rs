@@ -61,11 +61,7 @@ pub(super) fn all(series: &[Series], noise: &Noise) -> Vec<Verdict> {
             let tests = p.stats.tracing.primitive_tests - p.stats.shadow_tracing.primitive_tests;
             (tests, p.stats.camera_rays * p.primitives)
         }),
-        judge.exact("shadow tests = hits·L·O", |p| {
-            let hits = p.stats.shaded;
-            let tests = p.stats.shadow_tracing.primitive_tests;
-            (tests, hits * p.lights as u64 * p.primitives)
-        }),
+        judge.shadows(),
         power(
             "pixel loop, brute force",
             Axis::Pixels,
@@ -157,6 +153,26 @@ impl Judge<'_> {
             measured,
             outcome: outcome(equal == pairs.len()),
         })
+    }
+
+    /// Shadow tests: of all hits where every light shines on every hit, as on the landscape; of a mesh some hits
+    /// face away.
+    fn shadows(&self) -> Option<Verdict> {
+        let mut brute = self.series.iter().filter(|s| s.way == Way::Brute);
+        let all_lit = brute.all(|s| {
+            let mut points = s.points.iter();
+            points.all(|p| p.stats.shadow_rays == p.stats.shaded * p.lights as u64)
+        });
+        let tests = |p: &Point| p.stats.shadow_tracing.primitive_tests;
+        if all_lit {
+            return self.exact("shadow tests = hits·L·O", |p| {
+                (tests(p), p.stats.shaded * p.lights as u64 * p.primitives)
+            });
+        }
+        self.exact(
+            "shadow tests = shadow rays·O, for hits that face away have none",
+            |p| (tests(p), p.stats.shadow_rays * p.primitives),
+        )
     }
 
     /// A power law's exponent.
