@@ -37,3 +37,4 @@ pub mod integrator;
 pub mod render;
 
 pub mod crosscheck;
+pub mod profile;

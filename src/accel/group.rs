@@ -235,7 +235,7 @@ impl Group {
         let bounds = members.union();
         let (tree, items, used) = match recipe.method {
             Method::Tree => Tree::build(&members, recipe.build, recipe.cache.as_deref()),
-            Method::Brute => {
+            Method::Brute | Method::Exhaustive => {
                 let all = (0..members.count).collect();
                 (Tree::default(), all, CacheUse::default())
             }

@@ -46,6 +46,8 @@ impl Counts {
 pub enum Method {
     /// Test everything: O(P·O).
     Brute,
+    /// The same, and a shadow ray that is blocked goes on all the same, so that every ray costs O tests.
+    Exhaustive,
     /// A tree: O(P·log O).
     #[default]
     Tree,

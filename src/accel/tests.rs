@@ -114,6 +114,22 @@ fn the_tree_and_brute_force_find_the_same_hits_to_the_bit() {
 }
 
 #[test]
+fn exhaustive_rays_are_held_against_everything_and_find_the_same() {
+    let mesh = mesh::bumpy_sphere(2, 7);
+    let (rays, primitives) = (rays(500, &mesh.positions), mesh.triangles.len() as u64);
+    let shapes = [Arc::new(Geometry::Mesh(TriangleMesh::new(mesh)))];
+    let asked = [Method::Brute, Method::Exhaustive].map(|method| {
+        let tracer = Tracer::new(shapes.to_vec(), &[0], Vec::new(), method);
+        let (mut blocked, mut counts) = (Vec::new(), Counts::default());
+        tracer.occluded(&rays, &mut blocked, &mut counts);
+        (blocked, counts.primitive_tests)
+    });
+    assert!(asked[0].0.contains(&true) && asked[0].0 == asked[1].0);
+    assert!(asked[0].1 < asked[1].1);
+    assert_eq!(asked[1].1, rays.len() as u64 * primitives);
+}
+
+#[test]
 fn the_work_on_a_tree_changes_no_hit() {
     let mesh = mesh::bumpy_sphere(5, 7);
     let rays = rays(20_000, &mesh.positions);

@@ -66,7 +66,7 @@ impl<'t> Walk<'t> {
         if !group.unbounded().is_empty() {
             self.items::<_, ANY>(way, group.unbounded(), rays, ledger);
         }
-        if tracer.method == Method::Brute {
+        if tracer.method != Method::Tree {
             return self.items::<_, ANY>(way, group.items(), rays, ledger);
         }
         let mut counts = Counts::default();
@@ -96,6 +96,7 @@ impl<'t> Walk<'t> {
         rays: &[Ray],
         ledger: &mut L,
     ) {
+        let stops = ANY && self.tracer.method != Method::Exhaustive;
         for (i, ray) in rays.iter().enumerate().filter(|(_, ray)| is_sound(ray)) {
             let (boxes, shear) = (RayBoxes::new(ray), Shear::new(ray));
             let mut hit = ledger.hit(i);
@@ -104,7 +105,7 @@ impl<'t> Walk<'t> {
                 if found {
                     ledger.improve(i, hit);
                 }
-                if found && ANY {
+                if found && stops {
                     break;
                 }
             }

@@ -36,6 +36,8 @@ pub(super) struct Item {
     /// In file order from 0.
     pub(super) sensor: usize,
     pub(super) output: PathBuf,
+    /// Where the picture of its node steps goes.
+    pub(super) heatmap: Option<PathBuf>,
 }
 
 impl Item {
@@ -44,6 +46,14 @@ impl Item {
         let mut name = self.output.as_os_str().to_owned();
         name.push(".checkpoint");
         name.into()
+    }
+
+    /// What it writes.
+    pub(super) fn files(&self) -> impl Iterator<Item = &Path> {
+        [Some(&self.output), self.heatmap.as_ref()]
+            .into_iter()
+            .flatten()
+            .map(PathBuf::as_path)
     }
 
     /// For messages: `box.xml`, frame 7, sensor 1.
@@ -75,6 +85,7 @@ pub(super) struct Request<'a> {
     /// The first sensor where absent.
     pub(super) sensors: Option<&'a Sensors>,
     pub(super) output: &'a str,
+    pub(super) heatmap: Option<&'a str>,
     pub(super) scene: &'a SceneArguments,
 }
 
@@ -102,6 +113,7 @@ impl Request<'_> {
                         frame,
                         sensor: *sensor,
                         output: names.expand(self.output)?,
+                        heatmap: self.heatmap.map(|path| names.expand(path)).transpose()?,
                     });
                 }
             }
@@ -118,7 +130,8 @@ impl Request<'_> {
 
     /// Numbers and names of the sensors that are meant. The scene is read only where they depend on it.
     fn chosen(&self, input: &Path) -> Result<Vec<(usize, String)>> {
-        if self.sensors.is_none() && !self.output.contains("{sensor}") {
+        let mut patterns = [Some(self.output), self.heatmap].into_iter().flatten();
+        if self.sensors.is_none() && !patterns.any(|pattern| pattern.contains("{sensor}")) {
             return Ok(vec![(0, String::new())]);
         }
         let frame = self.numbers()[0];

@@ -10,10 +10,12 @@ mod compare;
 mod crosscheck;
 mod info;
 mod mesh;
+mod profile;
 mod relight;
 mod render;
 
 mod batch;
+mod growth;
 mod memory;
 mod output;
 mod parse;
@@ -47,6 +49,7 @@ enum Command {
     Crosscheck(Box<crosscheck::Arguments>),
     Info(info::Arguments),
     Mesh(mesh::Arguments),
+    Profile(Box<profile::Arguments>),
     Relight(relight::Arguments),
     /// Étendue's side of a crosscheck, which starts it: answers orders on standard input
     #[command(hide = true)]
@@ -65,6 +68,7 @@ pub(crate) fn run() -> ExitCode {
         Command::Crosscheck(arguments) => crosscheck::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
         Command::Mesh(arguments) => mesh::run(&arguments),
+        Command::Profile(arguments) => profile::run(&arguments),
         Command::Relight(arguments) => relight::run(&arguments),
         Command::CrosscheckWorker => crosscheck::serve(),
     };

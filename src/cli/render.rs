@@ -1,16 +1,18 @@
 //! `etendue render`: scenes or bare meshes to images.
 
 use std::num::NonZeroUsize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
 use etendue::accel::{Build, Method};
+use etendue::compare::map::{Map, robust_top};
 use etendue::description::{self, Description, Value};
 use etendue::display;
 use etendue::error::{Error, Problem, Result};
+use etendue::image;
 use etendue::render::{
-    self, Adaptive, Checkpoint, Colors, Options, Overrides, Rendered, Session, is_mesh,
+    self, Adaptive, Checkpoint, Colors, Options, Overrides, Progress, Rendered, Session, is_mesh,
 };
 use etendue::sensor::Window;
 use glam::DMat4;
@@ -131,6 +133,10 @@ pub(super) struct Arguments {
     /// Print what was counted and timed
     #[arg(long, help_heading = TELL)]
     stats: bool,
+    /// Draw how many nodes of the trees the rays of each pixel enter, a sample, as a picture with a legend. Up to
+    /// 16 samples of each pixel are traced once more for it. Names as for OUT
+    #[arg(long, value_name = "OUT.png", help_heading = TELL)]
+    heatmap: Option<String>,
 }
 
 const IMAGE: &str = "The image";
@@ -149,7 +155,8 @@ Examples:
   etendue render walk.xml -o out/{frame:04}.exr --frames 0:240 -D body=body-{frame:04}.ply
   etendue render room.xml -o room.exr --noise-threshold 0.01 --sampler sobol
   etendue render big.xml -o big.exr --checkpoint 300 --resume
-  etendue render terrain.ply -o terrain.png --cache ~/.cache/etendue";
+  etendue render terrain.ply -o terrain.png --cache ~/.cache/etendue
+  etendue render dragon.ply -o dragon.png --stats --heatmap steps.png";
 
 /// How rays find shapes.
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -199,6 +206,7 @@ impl Arguments {
             }),
             cache: self.cache.clone(),
             sensor: item.sensor,
+            pinned: false,
             checkpoint: (self.checkpoint.is_some() || self.resume).then_some(checkpoint),
             memory_limit,
         }
@@ -233,6 +241,7 @@ impl Arguments {
             frames: self.frames.or(self.turntable.map(Frames::first)),
             sensors: self.sensor.as_ref(),
             output: &self.output,
+            heatmap: self.heatmap.as_deref(),
             scene: &self.scene,
         };
         request.batch()
@@ -250,9 +259,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     }
     let stop = Stop::on_signals()?;
     let Batch { items, failed } = arguments.batch()?;
-    output::check_distinct(items.iter().map(|i| (i.output.as_path(), i.name())))?;
+    output::check_distinct((items.iter()).flat_map(|i| i.files().map(|file| (file, i.name()))))?;
     let wanted = items.iter().filter(|item| !arguments.skips(item));
-    output::check_writable(wanted.map(|item| item.output.as_path()))?;
+    output::check_writable(wanted.flat_map(Item::files))?;
     let mut series = Series {
         arguments,
         session: Session::default(),
@@ -343,7 +352,11 @@ impl Series<'_> {
             let turns = frame as f64 / f64::from(count);
             turn(&mut description, sensor, &bounds, turns);
         }
-        let rendered = self.session.render(&description, options, bar);
+        let mut rendered = self.session.render(&description, options, bar);
+        if let (Some(path), Ok(_), false) = (&item.heatmap, &rendered, bar.stop()) {
+            let drawn = self.heatmap(&description, path, options, bar);
+            rendered = rendered.and_then(|rendered| drawn.map(|()| rendered));
+        }
         if is_mesh(&item.input) {
             if let Some((sensor, pose)) = pose {
                 description.set(sensor, "to_world", pose);
@@ -351,6 +364,27 @@ impl Series<'_> {
             self.read = Some((item.input.clone(), as_read, description));
         }
         rendered
+    }
+
+    /// Draws the picture of node steps, unless stopped.
+    fn heatmap(
+        &mut self,
+        description: &Description,
+        path: &Path,
+        options: &Options,
+        bar: &Bar,
+    ) -> Result<()> {
+        let heat = self.session.heat(description, options, bar)?;
+        if bar.stop() {
+            return Ok(());
+        }
+        let map = Map {
+            width: heat.width,
+            values: &heat.node_steps,
+            label: "node steps a sample",
+            top: robust_top(&heat.node_steps),
+        };
+        image::write_codes(path, &map.draw()?)
     }
 
     /// The description of an item, with the arguments' values in place of its own.

@@ -66,20 +66,31 @@ impl SceneArguments {
         options: &Options,
         session: &mut Session,
     ) -> Result<Description> {
+        self.check(input)?;
         if render::is_mesh(input) {
-            let up = match self.up {
-                Up::Y => UpAxis::Y,
-                Up::Z => UpAxis::Z,
-            };
-            let BareMesh { description, mesh } = render::describe_mesh(input, up, options)?;
+            let BareMesh { description, mesh } =
+                render::describe_mesh(input, self.up_axis(), options)?;
             session.give(mesh);
             return Ok(description);
         }
-        if is_scene(input) {
-            return Description::read(input, options);
+        Description::read(input, options)
+    }
+
+    /// Refuses what is neither a scene nor a mesh by its name.
+    pub(super) fn check(&self, input: &Path) -> Result<()> {
+        if render::is_mesh(input) || is_scene(input) {
+            return Ok(());
         }
         let message = format!("{}: neither a scene nor a mesh", input.display());
         Err(Error::input(message).help("a scene is an .xml file, a mesh a .ply or .obj"))
+    }
+
+    /// Which way is up in a bare mesh.
+    pub(super) fn up_axis(&self) -> UpAxis {
+        match self.up {
+            Up::Y => UpAxis::Y,
+            Up::Z => UpAxis::Z,
+        }
     }
 }
 

@@ -134,6 +134,14 @@ fn stats(report: &Report) {
     let stats = &report.stats;
     let rays = stats.rays().max(1) as f64;
     let rate = rays / report.seconds.render.max(1e-9) * 1e-6;
+    let share = |seconds: f64| {
+        let all = report.seconds;
+        let all = all.closest + all.occluded + all.shade + all.film;
+        format!("{seconds:.3} ({:.0} %)", 100.0 * seconds / all.max(1e-9))
+    };
+    let each = |counts: u64, rays: u64| counts as f64 / rays.max(1) as f64;
+    let (all, shadow) = (stats.tracing, stats.shadow_tracing);
+    let others = stats.camera_rays + stats.bounce_rays;
     let megabytes = |bytes: usize| bytes as f64 * 1e-6;
     let [geometry, trees] = report.bytes.map(megabytes);
     let kept = report.cache.as_ref().map(|cache| {
@@ -153,11 +161,21 @@ fn stats(report: &Report) {
         ("points shaded", stats.shaded.to_string()),
         (
             "node steps a ray",
-            format!("{:.2}", stats.tracing.node_steps as f64 / rays),
+            format!(
+                "{:.2} (shadow rays {:.2}, others {:.2})",
+                each(all.node_steps, stats.rays()),
+                each(shadow.node_steps, stats.shadow_rays),
+                each(all.node_steps - shadow.node_steps, others)
+            ),
         ),
         (
             "primitive tests a ray",
-            format!("{:.2}", stats.tracing.primitive_tests as f64 / rays),
+            format!(
+                "{:.2} (shadow rays {:.2}, others {:.2})",
+                each(all.primitive_tests, stats.rays()),
+                each(shadow.primitive_tests, stats.shadow_rays),
+                each(all.primitive_tests - shadow.primitive_tests, others)
+            ),
         ),
         ("seconds to load", format!("{:.3}", report.seconds.load)),
         ("seconds to build", format!("{:.3}", report.seconds.build)),
@@ -165,9 +183,16 @@ fn stats(report: &Report) {
             "seconds to render",
             format!("{:.3} ({rate:.2} M rays/s)", report.seconds.render),
         ),
+        ("thread seconds: trace", share(report.seconds.closest)),
+        (
+            "                shadow rays",
+            share(report.seconds.occluded),
+        ),
+        ("                shade", share(report.seconds.shade)),
+        ("                film", share(report.seconds.film)),
     ];
     for (name, value) in rows.into_iter().chain(kept) {
-        output::line(&format!("  {name:22} {value}"));
+        output::line(&format!("  {name:27} {value}"));
     }
 }
 

@@ -2,7 +2,7 @@
 //! `name:kind, …`; nested integrators give the image itself (the first) and, where they have a name,
 //! channels `name.R` and so on. Where the camera sees nothing a channel is 0.
 
-use super::{Context, Estimate, Estimates, Estimator, Integrator, Start, Stats};
+use super::{Context, Cost, Estimate, Estimates, Estimator, Integrator, Start};
 use crate::color::{ColorModel, Spectral};
 use crate::description::{Kind, Properties, Property, Value};
 use crate::error::Result;
@@ -122,7 +122,7 @@ impl<C: ColorModel> Estimator<C> for Aov<C> {
         sampler: &Sampler,
         starts: &[Start<C>],
         estimates: &mut Estimates<C::Sample>,
-        stats: &mut Stats,
+        cost: &mut Cost,
     ) {
         let mut children = Vec::with_capacity(self.nested.len());
         for Nested { integrator, .. } in &self.nested {
@@ -130,13 +130,12 @@ impl<C: ColorModel> Estimator<C> for Aov<C> {
                 values: Vec::new(),
                 extra: Vec::new(),
             };
-            integrator.estimate(scene, sampler, starts, &mut child, stats);
+            integrator.estimate(scene, sampler, starts, &mut child, cost);
             children.push((child, integrator.extra_channels().len()));
         }
         let rays: Vec<Ray> = starts.iter().map(|s| s.ray).collect();
         let mut hits = Vec::new();
-        stats.camera_rays += rays.len() as u64;
-        scene.closest(&rays, &mut hits, &mut stats.tracing);
+        cost.closest(scene, 0, &rays, &mut hits);
 
         estimates.values.clear();
         estimates.extra.clear();

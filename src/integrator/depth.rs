@@ -1,6 +1,6 @@
 //! `depth`: the distance from the camera to what it sees, as a grey; 0 where it sees nothing.
 
-use super::{Context, Estimate, Estimates, Estimator, Start, Stats};
+use super::{Context, Cost, Estimate, Estimates, Estimator, Start};
 use crate::color::{ColorModel, Spectral};
 use crate::description::Properties;
 use crate::error::Result;
@@ -25,12 +25,11 @@ impl<C: ColorModel> Estimator<C> for Depth {
         _sampler: &Sampler,
         starts: &[Start<C>],
         estimates: &mut Estimates<C::Sample>,
-        stats: &mut Stats,
+        cost: &mut Cost,
     ) {
         let rays: Vec<Ray> = starts.iter().map(|s| s.ray).collect();
         let mut hits = Vec::new();
-        stats.camera_rays += rays.len() as u64;
-        scene.closest(&rays, &mut hits, &mut stats.tracing);
+        cost.closest(scene, 0, &rays, &mut hits);
         estimates.values.clear();
         estimates.values.extend(hits.iter().map(|hit| {
             let (depth, alpha) = if hit.is_miss() {

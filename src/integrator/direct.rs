@@ -3,7 +3,7 @@
 //! sampling. Equal to `path` at `max_depth` 2 in the mean.
 
 use super::mis::power;
-use super::{Context, Estimate, Estimates, Estimator, FIRST_DIMENSION, Start, Stats};
+use super::{Context, Cost, Estimate, Estimates, Estimator, FIRST_DIMENSION, Start};
 use crate::color::{ColorModel, Spectral};
 use crate::description::Properties;
 use crate::error::Result;
@@ -88,7 +88,7 @@ impl<C: ColorModel> Estimator<C> for Direct {
         sampler: &Sampler,
         starts: &[Start<C>],
         estimates: &mut Estimates<C::Sample>,
-        stats: &mut Stats,
+        cost: &mut Cost,
     ) {
         let estimates = &mut estimates.values;
         estimates.clear();
@@ -98,8 +98,7 @@ impl<C: ColorModel> Estimator<C> for Direct {
         );
         let (mut rays, mut hits): (Vec<Ray>, _) =
             (starts.iter().map(|s| s.ray).collect(), Vec::new());
-        stats.camera_rays += rays.len() as u64;
-        scene.closest(&rays, &mut hits, &mut stats.tracing);
+        cost.closest(scene, 0, &rays, &mut hits);
 
         let mut shadows: Vec<Probe<C::Sample>> = Vec::new();
         let mut probes: Vec<Probe<C::Sample>> = Vec::new();
@@ -123,7 +122,7 @@ impl<C: ColorModel> Estimator<C> for Direct {
                 alpha,
             });
             let Some(at) = at else { continue };
-            stats.shaded += 1;
+            cost.stats.shaded += 1;
             let material = scene.material(&at);
             let mut stream = start.stream;
             stream.seek(FIRST_DIMENSION);
@@ -174,12 +173,7 @@ impl<C: ColorModel> Estimator<C> for Direct {
         }
 
         let mut blocked = Vec::new();
-        stats.shadow_rays += shadows.len() as u64;
-        scene.occluded(
-            shadows.iter().map(|s| s.ray),
-            &mut blocked,
-            &mut stats.tracing,
-        );
+        cost.occluded(scene, shadows.iter().map(|s| s.ray), &mut blocked);
         for (shadow, _) in shadows
             .iter()
             .zip(&blocked)
@@ -190,8 +184,7 @@ impl<C: ColorModel> Estimator<C> for Direct {
 
         rays.clear();
         rays.extend(probes.iter().map(|p| p.ray));
-        stats.bounce_rays += rays.len() as u64;
-        scene.closest(&rays, &mut hits, &mut stats.tracing);
+        cost.closest(scene, 1, &rays, &mut hits);
         for (probe, hit) in probes.iter().zip(&hits) {
             let w = &starts[probe.slot as usize].wavelengths;
             let from = probe.scattered.map_or(probe.ray.origin, |(from, _)| from);

@@ -4,6 +4,8 @@
 //! rays traced. Contributions reach a path's slot in a fixed order (emission, then light samples, bounce
 //! by bounce), so that the sum's bits do not depend on the batch.
 
+mod cost;
+
 mod aov;
 mod depth;
 mod direct;
@@ -14,12 +16,13 @@ mod phong;
 mod layers;
 mod mis;
 
-use crate::accel::Counts;
 use crate::color::ColorModel;
 use crate::family::family;
 use crate::interaction::Ray;
 use crate::sampler::{Sampler, Stream};
 use crate::scene::Scene;
+
+pub use cost::{Cost, Stats};
 
 /// A camera sample.
 #[derive(Clone, Copy, Debug)]
@@ -50,37 +53,6 @@ pub struct Estimates<S> {
     pub extra: Vec<f32>,
 }
 
-/// What light transport costs, counted.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-pub struct Stats {
-    /// Rays from the camera.
-    pub camera_rays: u64,
-    /// Rays that continue a path.
-    pub bounce_rays: u64,
-    /// Rays that ask whether a light is visible.
-    pub shadow_rays: u64,
-    /// Points whose material was asked.
-    pub shaded: u64,
-    /// Steps and tests of all of them.
-    pub tracing: Counts,
-}
-
-impl Stats {
-    /// Rays of all kinds.
-    pub fn rays(&self) -> u64 {
-        self.camera_rays + self.bounce_rays + self.shadow_rays
-    }
-
-    /// Adds another part's counts.
-    pub fn add(&mut self, other: &Self) {
-        self.camera_rays += other.camera_rays;
-        self.bounce_rays += other.bounce_rays;
-        self.shadow_rays += other.shadow_rays;
-        self.shaded += other.shaded;
-        self.tracing.add(&other.tracing);
-    }
-}
-
 /// What every integrator does.
 pub trait Estimator<C: ColorModel>: std::fmt::Debug + Send + Sync {
     /// Names of the values that it estimates beside radiance and opacity.
@@ -95,7 +67,7 @@ pub trait Estimator<C: ColorModel>: std::fmt::Debug + Send + Sync {
         sampler: &Sampler,
         starts: &[Start<C>],
         estimates: &mut Estimates<C::Sample>,
-        stats: &mut Stats,
+        cost: &mut Cost,
     );
 }
 
@@ -141,8 +113,8 @@ impl<C: ColorModel> Estimator<C> for Integrator<C> {
         sampler: &Sampler,
         starts: &[Start<C>],
         estimates: &mut Estimates<C::Sample>,
-        stats: &mut Stats,
+        cost: &mut Cost,
     ) {
-        (**self).estimate(scene, sampler, starts, estimates, stats);
+        (**self).estimate(scene, sampler, starts, estimates, cost);
     }
 }

@@ -1,7 +1,7 @@
 //! `moment`: renders its nested integrator. (Mitsuba's also writes the samples' squares; its scenes use
 //! it for their references, and the image is the nested one's.)
 
-use super::{Context, Estimates, Estimator, Integrator, Start, Stats};
+use super::{Context, Cost, Estimates, Estimator, Integrator, Start};
 use crate::color::ColorModel;
 use crate::description::{Kind, Properties};
 use crate::error::Result;
@@ -42,9 +42,9 @@ impl<C: ColorModel> Estimator<C> for Moment<C> {
         sampler: &Sampler,
         starts: &[Start<C>],
         estimates: &mut Estimates<C::Sample>,
-        stats: &mut Stats,
+        cost: &mut Cost,
     ) {
         self.nested
-            .estimate(scene, sampler, starts, estimates, stats);
+            .estimate(scene, sampler, starts, estimates, cost);
     }
 }

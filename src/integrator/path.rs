@@ -5,7 +5,7 @@
 //! Roulette starts at `rr_depth` (5) and lets a path live with probability min(max(throughput)·η², 0.95).
 
 use super::mis::power;
-use super::{Context, Estimate, Estimates, Estimator, FIRST_DIMENSION, Start, Stats};
+use super::{Context, Cost, Estimate, Estimates, Estimator, FIRST_DIMENSION, Start};
 use crate::color::{ColorModel, Spectral};
 use crate::description::Properties;
 use crate::error::Result;
@@ -212,7 +212,7 @@ impl<C: ColorModel> Estimator<C> for Path {
         sampler: &Sampler,
         starts: &[Start<C>],
         estimates: &mut Estimates<C::Sample>,
-        stats: &mut Stats,
+        cost: &mut Cost,
     ) {
         let estimates = &mut estimates.values;
         estimates.clear();
@@ -247,12 +247,7 @@ impl<C: ColorModel> Estimator<C> for Path {
             }
             rays.clear();
             rays.extend(walkers.iter().map(|w| w.ray));
-            *if depth == 0 {
-                &mut stats.camera_rays
-            } else {
-                &mut stats.bounce_rays
-            } += rays.len() as u64;
-            scene.closest(&rays, &mut hits, &mut stats.tracing);
+            cost.closest(scene, depth, &rays, &mut hits);
 
             let mut hits = hits.iter();
             walkers = walkers
@@ -269,19 +264,14 @@ impl<C: ColorModel> Estimator<C> for Path {
                     if depth + 1 >= self.limits.max_depth {
                         return None;
                     }
-                    stats.shaded += 1;
+                    cost.stats.shaded += 1;
                     walker.stream.seek(FIRST_DIMENSION + depth * DIMENSIONS);
                     shadows.extend(Self::light(scene, sampler, &mut walker, &at));
                     self.scatter(scene, sampler, depth, walker, &at)
                 })
                 .collect();
 
-            stats.shadow_rays += shadows.len() as u64;
-            scene.occluded(
-                shadows.iter().map(|s| s.ray),
-                &mut blocked,
-                &mut stats.tracing,
-            );
+            cost.occluded(scene, shadows.iter().map(|s| s.ray), &mut blocked);
             for (shadow, _) in shadows
                 .drain(..)
                 .zip(&blocked)

@@ -12,7 +12,7 @@
 
 use super::layers::{Layers, Term};
 use super::path::Limits;
-use super::{Context, Estimate, Estimates, Estimator, FIRST_DIMENSION, Start, Stats};
+use super::{Context, Cost, Estimate, Estimates, Estimator, FIRST_DIMENSION, Start};
 use crate::color::{ColorModel, Spectral};
 use crate::description::Properties;
 use crate::error::Result;
@@ -106,10 +106,9 @@ impl<S: Spectral> Batch<'_, S> {
     }
 
     /// Adds what the lights bring that can be seen.
-    fn flush<C: ColorModel<Sample = S>>(&mut self, scene: &Scene<C>, stats: &mut Stats) {
-        stats.shadow_rays += self.shadows.len() as u64;
+    fn flush<C: ColorModel<Sample = S>>(&mut self, scene: &Scene<C>, cost: &mut Cost) {
         let rays = self.shadows.iter().map(|s| s.ray);
-        scene.occluded(rays, &mut self.blocked, &mut stats.tracing);
+        cost.occluded(scene, rays, &mut self.blocked);
         let mut shadows = std::mem::take(&mut self.shadows);
         for (i, shadow) in shadows.iter().enumerate() {
             if !self.blocked[i] {
@@ -254,7 +253,7 @@ impl<C: ColorModel> Estimator<C> for Phong {
         sampler: &Sampler,
         starts: &[Start<C>],
         estimates: &mut Estimates<C::Sample>,
-        stats: &mut Stats,
+        cost: &mut Cost,
     ) {
         let nothing = Estimate {
             radiance: C::Sample::zero(),
@@ -289,12 +288,7 @@ impl<C: ColorModel> Estimator<C> for Phong {
             }
             rays.clear();
             rays.extend(walkers.iter().map(|w| w.ray));
-            *if depth == 0 {
-                &mut stats.camera_rays
-            } else {
-                &mut stats.bounce_rays
-            } += rays.len() as u64;
-            scene.closest(&rays, &mut hits, &mut stats.tracing);
+            cost.closest(scene, depth, &rays, &mut hits);
 
             let mut hits = hits.iter();
             walkers = walkers
@@ -305,7 +299,7 @@ impl<C: ColorModel> Estimator<C> for Phong {
                     if depth + 1 >= self.limits.max_depth {
                         return None;
                     }
-                    stats.shaded += 1;
+                    cost.stats.shaded += 1;
                     let first = depth.wrapping_mul(dimensions);
                     walker.stream.seek(FIRST_DIMENSION.wrapping_add(first));
                     let smooth = scene.material(&at).is_smooth();
@@ -316,13 +310,13 @@ impl<C: ColorModel> Estimator<C> for Phong {
                             None => {}
                         }
                         if batch.shadows.len() == SHADOWS {
-                            batch.flush(scene, stats);
+                            batch.flush(scene, cost);
                         }
                     }
                     self.follow(scene, sampler, depth, walker, &at)
                 })
                 .collect();
-            batch.flush(scene, stats);
+            batch.flush(scene, cost);
         }
 
         let sums = batch.sums;

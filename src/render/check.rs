@@ -25,7 +25,7 @@ pub fn check(
         options,
         progress,
     };
-    start(options.threads)?.install(|| task.run_in(options.colors))
+    start(options.threads, false)?.install(|| task.run_in(options.colors))
 }
 
 struct Check<'a> {

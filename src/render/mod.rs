@@ -11,8 +11,10 @@ mod blocks;
 mod check;
 mod checkpoint;
 mod fingerprint;
+mod heat;
 mod info;
 mod memory;
+mod pinned;
 mod plan;
 mod prepare;
 mod samples;
@@ -23,7 +25,7 @@ mod unit;
 
 use std::time::{Duration, Instant};
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::accel::CacheUse;
 use crate::description::Description;
@@ -34,9 +36,11 @@ use crate::integrator::Stats;
 pub use adaptive::AdaptiveReport;
 pub use bare::{BareMesh, UpAxis, describe_mesh, is_mesh};
 pub use check::check;
+pub use heat::Heat;
 pub use info::{NamedFile, SceneInfo, SensorInfo};
 pub use memory::{check_mesh, human_bytes};
 pub use options::{Adaptive, Checkpoint, Colors, Options, Overrides};
+pub(crate) use pinned::pin;
 pub use plan::Completed;
 pub use progress::{Phase, Progress, Silent};
 pub use session::Session;
@@ -92,7 +96,7 @@ pub struct Report {
 }
 
 /// Wall-clock seconds by phase.
-#[derive(Clone, Copy, Debug, Default, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Seconds {
     /// Reading meshes.
     pub load: f64,
@@ -100,6 +104,48 @@ pub struct Seconds {
     pub build: f64,
     /// Tracing and shading.
     pub render: f64,
+    /// Of rendering, the seconds of all threads in the tracer, for camera rays and bounces.
+    pub closest: f64,
+    /// And for shadow rays.
+    pub occluded: f64,
+    /// Of rendering, the seconds of all threads in cameras, materials and lights.
+    pub shade: f64,
+    /// Of rendering, the seconds of all threads in making pixels of samples.
+    pub film: f64,
+}
+
+impl Seconds {
+    /// Adds another render's.
+    pub fn add(&mut self, other: &Self) {
+        self.load += other.load;
+        self.build += other.build;
+        self.render += other.render;
+        self.closest += other.closest;
+        self.occluded += other.occluded;
+        self.shade += other.shade;
+        self.film += other.film;
+    }
+
+    /// A part of them: the mean of so many renders where they are a sum.
+    #[must_use]
+    pub fn divided(&self, by: f64) -> Self {
+        Self {
+            load: self.load / by,
+            build: self.build / by,
+            render: self.render / by,
+            closest: self.closest / by,
+            occluded: self.occluded / by,
+            shade: self.shade / by,
+            film: self.film / by,
+        }
+    }
+
+    fn spend(&mut self, times: &sums::Times) {
+        self.closest = times.closest;
+        self.occluded = times.occluded;
+        self.shade = times.shade;
+        self.film = times.film;
+    }
 }
 
 /// Renders a single image: see [`Session::render`].

@@ -50,6 +50,8 @@ pub struct Options {
     pub seed: u64,
     /// Threads; one a processor where absent.
     pub threads: Option<NonZeroUsize>,
+    /// Whether each thread stays on a processor of its own, where the system lets it: for measuring.
+    pub pinned: bool,
     /// RGB or bands.
     pub colors: Colors,
     /// Where samples go; the same number to every pixel where absent.

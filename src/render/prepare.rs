@@ -234,7 +234,7 @@ fn make<C: ColorModel>(
         film,
         assets: assets.bytes() as u64,
         trees: match options.method {
-            Method::Brute => 0,
+            Method::Brute | Method::Exhaustive => 0,
             Method::Tree => memory::trees(primitives),
         },
     };

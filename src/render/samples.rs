@@ -1,13 +1,15 @@
 //! Camera samples: from their places on the film to what the integrator and the colour model make of them,
 //! a batch at a time.
 
+use std::time::{Duration, Instant};
+
 use glam::Vec2;
 
 use super::prepare::Job;
 use super::progress::Progress;
 use super::sums::Tally;
 use crate::color::ColorModel;
-use crate::integrator::{Estimates, Estimator, Start};
+use crate::integrator::{Cost, Estimates, Estimator, Start};
 use crate::sampler::{Sampler, Stream};
 
 /// Bytes of path state in flight in a batch: within a core's caches, with rays enough for the tracer.
@@ -25,6 +27,8 @@ pub(super) fn estimate<C: ColorModel, S: Sink>(
     progress: &dyn Progress,
     sink: &mut S,
 ) {
+    let begin = Instant::now();
+    let (mut cost, mut film) = (Cost::default(), Duration::ZERO);
     let batch = BATCH_BYTES / size_of::<Start<C>>() / 4;
     let mut starts: Vec<Start<C>> = Vec::with_capacity(batch);
     let mut places: Vec<Place> = Vec::with_capacity(batch);
@@ -35,11 +39,11 @@ pub(super) fn estimate<C: ColorModel, S: Sink>(
     let extra = job.view.integrator.extra_channels().len();
     let mut row = vec![0.0; job.channels().len()];
     let mut flush = |starts: &mut Vec<Start<C>>, places: &mut Vec<Place>| {
-        let stats = &mut sink.tally().stats;
-        let before = stats.rays();
+        let before = cost.stats.rays();
         let (scene, integrator) = (job.scene, &job.view.integrator);
-        integrator.estimate(scene, sampler, starts, &mut estimates, stats);
-        let rays = stats.rays() - before;
+        integrator.estimate(scene, sampler, starts, &mut estimates, &mut cost);
+        let rays = cost.stats.rays() - before;
+        let estimated = Instant::now();
         for (i, (start, place)) in starts.iter().zip(places.iter()).enumerate() {
             let estimate = &estimates.values[i];
             scene
@@ -50,6 +54,7 @@ pub(super) fn estimate<C: ColorModel, S: Sink>(
             row[opacity] = estimate.alpha;
             sink.take(place, &row);
         }
+        film += estimated.elapsed();
         progress.advance(starts.len() as u64, rays);
         starts.clear();
         places.clear();
@@ -63,6 +68,8 @@ pub(super) fn estimate<C: ColorModel, S: Sink>(
         }
     }
     flush(&mut starts, &mut places);
+    let total = begin.elapsed().as_secs_f64();
+    sink.tally().spend(&cost, total, film.as_secs_f64());
 }
 
 /// Where samples go.

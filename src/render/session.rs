@@ -8,7 +8,9 @@ use rayon::ThreadPool;
 
 use super::adaptive::{self, AdaptiveReport};
 use super::checkpoint::Keeper;
+use super::heat::{self, Heat};
 use super::options::{Adaptive, Colors, Options};
+use super::pinned;
 use super::plan::Completed;
 use super::prepare::{self, Facts, Job, Shelf};
 use super::progress::Progress;
@@ -31,7 +33,8 @@ pub struct Session {
 
 #[derive(Debug)]
 struct Pool {
-    asked: Option<NonZeroUsize>,
+    /// How many threads, and whether pinned.
+    asked: (Option<NonZeroUsize>, bool),
     threads: ThreadPool,
 }
 
@@ -129,6 +132,7 @@ impl Task for Render<'_> {
             report.adaptive = Some(adaptive);
         }
         report.stats = tally.stats;
+        report.seconds.spend(&tally.times);
         report.dropped_samples = tally.dropped;
         report.dropped_pixel = tally.dropped_pixel;
         warnings.extend(tally.warning());
@@ -143,6 +147,24 @@ impl Task for Render<'_> {
             kept.told();
         }
         Ok(rendered)
+    }
+}
+
+/// Counts by pixel.
+struct Warm<'a>(Ask<'a>);
+
+impl Task for Warm<'_> {
+    type Output = Heat;
+
+    fn run<C: ColorModel>(self, color: C) -> Result<Heat> {
+        let Ask {
+            shelf,
+            description,
+            options,
+            progress,
+        } = self.0;
+        let job = prepare::prepare(shelf, description, options, color, progress)?;
+        heat::count(&job, progress)
     }
 }
 
@@ -164,10 +186,12 @@ impl Finished {
         if let Some(keeper) = keeper {
             keeper.finish(&summed, completed.is_whole());
         }
+        let mut tally = summed.sums.tally;
+        let develop = || summed.sums.develop(&job.view.film);
         Ok(Self {
-            image: summed.sums.develop(&job.view.film)?,
+            image: added(&mut tally.times.film, develop)?,
             completed,
-            tally: summed.sums.tally,
+            tally,
             adaptive: None,
         })
     }
@@ -184,13 +208,22 @@ impl Finished {
             keeper.finish(&summed, completed.is_whole());
         }
         let blocks = &summed.sums;
+        let mut tally = *blocks.tally();
         Ok(Self {
-            image: adaptive::develop(job, blocks)?,
+            image: added(&mut tally.times.film, || adaptive::develop(job, blocks))?,
             completed,
-            tally: *blocks.tally(),
+            tally,
             adaptive: Some(adaptive::report(job, adaptive, &ladder, blocks)),
         })
     }
+}
+
+/// Does `work` and adds the seconds that it takes.
+fn added<T>(seconds: &mut f64, work: impl FnOnce() -> T) -> T {
+    let mut more = 0.0;
+    let result = timed(&mut more, work);
+    *seconds += more;
+    result
 }
 
 impl Session {
@@ -220,6 +253,27 @@ impl Session {
                 progress,
             };
             Render(ask).run_in(options.colors)
+        })
+    }
+
+    /// How many nodes of the trees each pixel enters: see [`Heat`].
+    ///
+    /// # Errors
+    /// As [`Session::render`].
+    pub fn heat(
+        &mut self,
+        description: &Description,
+        options: &Options,
+        progress: &dyn Progress,
+    ) -> Result<Heat> {
+        self.run(options, |shelf| {
+            let ask = Ask {
+                shelf,
+                description,
+                options,
+                progress,
+            };
+            Warm(ask).run_in(options.colors)
         })
     }
 
@@ -261,11 +315,12 @@ impl Session {
         work: impl FnOnce(&mut Shelf) -> Result<T> + Send,
     ) -> Result<T> {
         let shelf = &mut self.shelf;
+        let asked = (options.threads, options.pinned);
         let pool = match &mut self.pool {
-            Some(pool) if pool.asked == options.threads => pool,
+            Some(pool) if pool.asked == asked => pool,
             pool => pool.insert(Pool {
-                asked: options.threads,
-                threads: start(options.threads)?,
+                asked,
+                threads: start(options.threads, options.pinned)?,
             }),
         };
         pool.threads.install(|| work(shelf))
@@ -273,10 +328,13 @@ impl Session {
 }
 
 /// Starts so many threads, one a processor where that is open.
-pub(super) fn start(threads: Option<NonZeroUsize>) -> Result<ThreadPool> {
+pub(super) fn start(threads: Option<NonZeroUsize>, pinned: bool) -> Result<ThreadPool> {
     let threads = threads.map_or(0, NonZeroUsize::get);
-    rayon::ThreadPoolBuilder::new()
-        .num_threads(threads)
+    let mut builder = rayon::ThreadPoolBuilder::new().num_threads(threads);
+    if pinned {
+        builder = builder.start_handler(pinned::pin);
+    }
+    builder
         .build()
         .map_err(|e| Error::input(format!("cannot start {threads} threads: {e}")))
 }

@@ -11,7 +11,7 @@ use crate::color::luminance;
 use crate::error::{Error, Problem, Result};
 use crate::filter::{Filter, MAX_RADIUS};
 use crate::image::Image;
-use crate::integrator::Stats;
+use crate::integrator::{Cost, Stats};
 use crate::sensor::{Film, PixelFormat, Window};
 
 /// How far beyond its own pixel a sample reaches.
@@ -22,10 +22,34 @@ pub(super) fn border(filter: &Filter) -> u32 {
 /// The most pixels along an axis that a sample reaches.
 const MAX_REACH: usize = 2 * (MAX_RADIUS as usize + 1) + 1;
 
+/// Seconds of threads that estimate samples, by what they do.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+pub(super) struct Times {
+    /// First hits of camera rays and bounces.
+    pub(super) closest: f64,
+    /// Shadow rays.
+    pub(super) occluded: f64,
+    /// The integrator beside them, and the camera.
+    pub(super) shade: f64,
+    /// Colours and splatting.
+    pub(super) film: f64,
+}
+
+impl Times {
+    fn add(&mut self, other: &Self) {
+        self.closest += other.closest;
+        self.occluded += other.occluded;
+        self.shade += other.shade;
+        self.film += other.film;
+    }
+}
+
 /// What samples cost, and what came of them beside the sums.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(super) struct Tally {
     pub(super) stats: Stats,
+    #[serde(default)]
+    pub(super) times: Times,
     /// Samples that were not finite.
     pub(super) dropped: u64,
     /// The first one's pixel.
@@ -36,8 +60,21 @@ impl Tally {
     /// Adds what came later.
     pub(super) fn add(&mut self, other: &Self) {
         self.stats.add(&other.stats);
+        self.times.add(&other.times);
         self.dropped += other.dropped;
         self.dropped_pixel = self.dropped_pixel.or(other.dropped_pixel);
+    }
+
+    /// Adds what integrators cost within `total` seconds of a thread, of which the film took `film`.
+    pub(super) fn spend(&mut self, cost: &Cost, total: f64, film: f64) {
+        let [closest, occluded] = [cost.closest, cost.occluded].map(|time| time.as_secs_f64());
+        self.stats.add(&cost.stats);
+        self.times.add(&Times {
+            closest,
+            occluded,
+            shade: (total - closest - occluded - film).max(0.0),
+            film,
+        });
     }
 
     /// Whether a sample's values are finite; where they are not, it is counted as dropped.

@@ -559,3 +559,47 @@ fn adaptive_sampling_of_rare_light_does_not_bias_the_mean() {
     assert!(error < 0.04 * b, "{error} is too much to tell: {a}, {b}");
     assert!((a - b).abs() < 4.0 * error, "{a} and {b}, ± {error}");
 }
+
+#[test]
+fn the_pixels_of_a_heat_map_add_up_to_what_the_render_counts() {
+    let place = Place::new();
+    // Without a filter that reaches beyond the crop, whose samples the render would take as well.
+    let film = "<rfilter type='box'/><integer name='crop_width' value='41'/>\
+        <integer name='crop_offset_y' value='3'/><integer name='crop_height' value='30'/></film>";
+    let scene =
+        SCENE
+            .replacen("</film>", film, 1)
+            .replacen("'40'/></sampler>", "'7'/></sampler>", 1);
+    let scene = place.scene(&scene);
+    let mut session = Session::default();
+    let options = Options::default();
+    let rendered = session.render(&scene, &options, &Silent).unwrap();
+    let heat = session.heat(&scene, &options, &Silent).unwrap();
+    assert_eq!((heat.width, heat.node_steps.len()), (41, 41 * 30));
+    assert_eq!((heat.samples, heat.stats), (7, rendered.report.stats));
+    let sum: f64 = heat.node_steps.iter().map(|steps| f64::from(*steps)).sum();
+    let counted = heat.stats.tracing.node_steps as f64;
+    assert!((7.0 * sum / counted - 1.0).abs() < 1e-5, "{sum} {counted}");
+}
+
+#[test]
+fn the_times_of_a_render_are_those_of_its_threads() {
+    let place = Place::new();
+    let options = Options {
+        threads: std::num::NonZeroUsize::new(1),
+        pinned: true,
+        ..Options::default()
+    };
+    let seconds = render(&place.scene(SCENE), &options, &Silent)
+        .unwrap()
+        .report
+        .seconds;
+    let parts = [
+        seconds.closest,
+        seconds.occluded,
+        seconds.shade,
+        seconds.film,
+    ];
+    assert!(parts.iter().all(|part| *part > 0.0), "{parts:?}");
+    assert!(parts.iter().sum::<f64>() <= seconds.render);
+}

@@ -124,6 +124,7 @@ fn help_reads_as_it_was_blessed() {
             &["mesh", "generate", "terrain", "--help"],
         ),
         ("mesh-report", &["mesh", "report", "--help"]),
+        ("profile", &["profile", "--help"]),
     ] {
         let output = Command::new(env!("CARGO_BIN_EXE_etendue"))
             .args(arguments)

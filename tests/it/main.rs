@@ -15,5 +15,6 @@ mod lights;
 mod mesh;
 mod mitsuba_data;
 mod phong;
+mod profile;
 mod resume;
 mod same_bits;

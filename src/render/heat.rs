@@ -1,0 +1,82 @@
+//! Where a render's work lies: for each pixel of the crop the nodes that its rays enter, of all kinds, a sample.
+//! Each pixel is traced by itself, so that its counts are its own; they add up to those of a render.
+
+use std::sync::Mutex;
+
+use rayon::prelude::*;
+
+use super::plan::PASS;
+use super::prepare::Job;
+use super::progress::{Phase, Progress, Silent};
+use super::samples::{self, Place, Sink};
+use super::sums::Tally;
+use crate::color::ColorModel;
+use crate::error::{Error, Result};
+use crate::integrator::Stats;
+use crate::sampler::Stream;
+
+/// Counts by pixel.
+#[derive(Clone, Debug)]
+pub struct Heat {
+    /// Pixels across.
+    pub width: usize,
+    /// Node steps a sample, row by row.
+    pub node_steps: Vec<f32>,
+    /// What all of it took.
+    pub stats: Stats,
+    /// Samples of each pixel: the render's first, 16 at most.
+    pub samples: u32,
+}
+
+/// Counts, and lets go of what was estimated.
+struct Counted(Tally);
+
+impl Sink for Counted {
+    fn tally(&mut self) -> &mut Tally {
+        &mut self.0
+    }
+
+    fn take(&mut self, _: &Place, _: &[f32]) {}
+}
+
+/// Traces the job's crop.
+pub(super) fn count<C: ColorModel>(job: &Job<'_, C>, progress: &dyn Progress) -> Result<Heat> {
+    let crop = &job.view.film.crop;
+    let samples = job.view.sampler.sample_count().min(PASS);
+    let (width, height) = (crop.width as usize, crop.height as usize);
+    let mut node_steps: Vec<f32> = Vec::new();
+    node_steps
+        .try_reserve_exact(width * height)
+        .map_err(|_| Error::input("the counts of all pixels do not fit into memory"))?;
+    node_steps.resize(width * height, 0.0);
+    progress.begin(Phase::Render, u64::from(samples) * (width * height) as u64);
+    let stats = Mutex::new(Stats::default());
+    let rows = node_steps
+        .par_chunks_exact_mut(width)
+        .zip(crop.y..crop.y + crop.height);
+    rows.for_each(|(row, y)| {
+        if progress.stop() {
+            return;
+        }
+        let mut of_row = Stats::default();
+        for (steps, x) in row.iter_mut().zip(crop.x..) {
+            let mut sink = Counted(Tally::default());
+            let streams = (0..samples).map(|i| ([x, y], Stream::new(job.seed, x, y, i)));
+            samples::estimate(job, &job.view.sampler, streams, &Silent, &mut sink);
+            let counted = sink.0.stats;
+            *steps = counted.tracing.node_steps as f32 / samples as f32;
+            of_row.add(&counted);
+        }
+        progress.advance(u64::from(samples) * width as u64, of_row.rays());
+        stats
+            .lock()
+            .expect("no thread panics while it adds")
+            .add(&of_row);
+    });
+    Ok(Heat {
+        width,
+        node_steps,
+        stats: stats.into_inner().expect("no thread panicked"),
+        samples,
+    })
+}
