@@ -6,8 +6,8 @@
 //!     cargo bench --bench rays -- --quick --json target/rays.json    # fewer rays, no terrain
 //!
 //! The tracers take turns in each round, each with one thread and with two, so that what disturbs the machine
-//! disturbs all alike. A ratio is of medians over the rounds, and beside it stand the least and the greatest
-//! of a single round. Two threads are to be held against what an arithmetic loop gains in the same rounds.
+//! disturbs all alike. A ratio is the median over the rounds, and beside it stand the least and the greatest.
+//! Two threads are to be held against what an arithmetic loop gains in the same rounds.
 //! "Differ" counts the rays on which a tracer and Étendue do not agree.
 
 #![allow(clippy::print_stdout, clippy::print_stderr)] // a bench's business

@@ -1,8 +1,8 @@
 //! One mesh: its builds, then in each round every tracer with each number of threads, taking turns.
 
 use std::hint::black_box;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Barrier};
 use std::thread;
 use std::time::Instant;
 
@@ -163,23 +163,31 @@ fn time(peer: &dyn Peer, question: Question, batches: &[Batch<'_>], threads: usi
     })
 }
 
-/// Seconds until `work` is done on so many threads.
+/// Seconds until `work` is done on so many threads, which are there when the time begins.
 fn on_each(threads: usize, work: impl Fn() + Sync) -> f64 {
-    let start = Instant::now();
+    let ready = Barrier::new(threads);
     thread::scope(|scope| {
         for _ in 1..threads {
-            scope.spawn(&work);
+            scope.spawn(|| {
+                ready.wait();
+                work();
+            });
         }
+        ready.wait();
+        let start = Instant::now();
         work();
-    });
-    start.elapsed().as_secs_f64()
+        start
+    })
+    .elapsed()
+    .as_secs_f64()
 }
 
-/// By how much two threads are faster than one at work that needs no memory: the machine's own limit.
+/// By how much two threads are faster than one at work that needs no memory: the machine's own limit. It takes
+/// as long as a tracer does, for what is over in a few milliseconds says more of the scheduler.
 fn arithmetic_gain(threads: &[usize]) -> Option<f64> {
     let work = || {
         let mut x: [f32; 16] = black_box(std::array::from_fn(|i| i as f32));
-        for _ in 0..4_000_000 {
+        for _ in 0..30_000_000 {
             x = x.map(|x| x * 0.75 + 1.0);
         }
         black_box(x);

@@ -92,11 +92,11 @@ pub(crate) struct Ratio {
 impl Ratio {
     /// `before` and `after` are seconds, round by round.
     pub(crate) fn of(before: &[f64], after: &[f64]) -> Self {
-        let rounds = || before.iter().zip(after).map(|(b, a)| b / a);
+        let rounds: Vec<f64> = before.iter().zip(after).map(|(b, a)| b / a).collect();
         Self {
-            median: median(before) / median(after),
-            least: rounds().fold(f64::INFINITY, f64::min),
-            greatest: rounds().fold(0.0, f64::max),
+            median: median(&rounds),
+            least: rounds.iter().copied().fold(f64::INFINITY, f64::min),
+            greatest: rounds.iter().copied().fold(0.0, f64::max),
         }
     }
 
