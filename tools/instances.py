@@ -7,6 +7,7 @@ turned anywhere.
 With a hundred thousand dragons of 871 414 triangles that is 87 billion.
 """
 import argparse
+import math
 import random
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
@@ -28,10 +29,18 @@ HEAD = """<scene version="3.0.0">
     </shape>
 """
 COPY = (
-    '    <shape type="instance"><ref id="one"/><transform name="to_world"><scale value="{:.6g}"/>'
-    '<rotate y="1" angle="{:.3f}"/><rotate x="1" angle="{:.3f}"/><translate x="{:.6f}" y="{:.6f}" z="{:.6f}"/>'
-    "</transform></shape>\n"
+    '    <shape type="instance"><ref id="one"/>'
+    '<transform name="to_world"><matrix value="{} 0 0 0 1"/></transform></shape>\n'
 )
+
+
+def turned(draw):
+    """The rows of a rotation, about y and then about x, and the rest of a matrix: few elements make a short file."""
+    (a, b), size, at = (draw(0, math.tau), draw(0, math.tau)), draw(0.7, 1.3), [draw(-1, 1) for _ in range(3)]
+    (c, s), (d, t) = ((math.cos(x), math.sin(x)) for x in (a, b))
+    rows = ((c, 0, s), (t * s, d, -t * c), (-d * s, t, d * c))
+    return size, rows, at
+
 
 
 def main():
@@ -47,8 +56,9 @@ def main():
     with options.out.open("w") as out:
         out.write(HEAD.format(type=mesh.suffix[1:].lower(), mesh=quoteattr(str(mesh))))
         for _ in range(options.count):
-            turns = draw(0, 360), draw(-180, 180)
-            out.write(COPY.format(options.scale * draw(0.7, 1.3), *turns, *(draw(-1, 1) for _ in range(3))))
+            size, rows, at = turned(draw)
+            scaled = ([options.scale * size * x for x in row] + [at[i]] for i, row in enumerate(rows))
+            out.write(COPY.format(" ".join(f"{x:.6g}" for row in scaled for x in row)))
         out.write("</scene>\n")
 
 
