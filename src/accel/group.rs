@@ -6,6 +6,7 @@ use std::sync::Arc;
 use glam::Vec3;
 use rayon::prelude::*;
 
+use crate::math::Transform;
 use crate::shape::{Bounds, Geometry};
 
 use super::wide::{Leaves, Tree};
@@ -95,8 +96,8 @@ impl Shapes {
 /// for there may be tens of millions.
 pub(super) struct Members<'a> {
     shapes: &'a Shapes,
-    /// The boxes of instances.
-    instances: &'a [Bounds],
+    /// The boxes of instances, which are in the world alone.
+    instances: Option<&'a [Bounds]>,
     runs: Vec<Run>,
     count: u32,
     /// Items that have no finite box.
@@ -112,10 +113,12 @@ struct Run {
 
 /// Items whose boxes one task joins.
 const GRAIN: u32 = 1 << 14;
+/// Cells of a group's box along an axis.
+const CELLS: usize = 4;
 
 impl<'a> Members<'a> {
-    /// The primitives of some `shapes`, and all `instances` in their boxes.
-    pub(super) fn new(all: &'a Shapes, shapes: &[u32], instances: &'a [Bounds]) -> Self {
+    /// The primitives of some `shapes`, and for the world all `instances` in their boxes.
+    pub(super) fn new(all: &'a Shapes, shapes: &[u32], instances: Option<&'a [Bounds]>) -> Self {
         let mut members = Self {
             shapes: all,
             instances,
@@ -132,8 +135,12 @@ impl<'a> Members<'a> {
                 _ => members.sift(first, count),
             }
         }
-        members.sift(Item::instance(0), instances.len() as u32);
+        members.sift(Item::instance(0), members.boxes().len() as u32);
         members
+    }
+
+    fn boxes(&self) -> &'a [Bounds] {
+        self.instances.unwrap_or_default()
     }
 
     /// Takes `count` items from `first` on.
@@ -170,7 +177,7 @@ impl<'a> Members<'a> {
 
     fn bounds_of(&self, item: Item) -> Bounds {
         match item.as_instance() {
-            Some(instance) => self.instances[instance as usize],
+            Some(instance) => self.boxes()[instance as usize],
             None => self.shapes.get(item.shape).bounds(item.index),
         }
     }
@@ -183,6 +190,30 @@ impl<'a> Members<'a> {
             boxes.fold(Bounds::EMPTY, Bounds::union)
         });
         parts.reduce(|| Bounds::EMPTY, Bounds::union)
+    }
+
+    /// Boxes that hold all items, each those whose centres are in one cell of a coarse grid over `bounds`.
+    fn parts(&self, bounds: &Bounds) -> Vec<Bounds> {
+        const NONE: [Bounds; CELLS * CELLS * CELLS] = [Bounds::EMPTY; _];
+        let scale = CELLS as f32 / (bounds.max - bounds.min);
+        let cell = |item: &Bounds| {
+            let place = (0.5 * item.min + 0.5 * item.max - bounds.min) * scale;
+            // What is no number, in a flat box, is in the first cell.
+            let [x, y, z] = place.to_array().map(|at| (at as usize).min(CELLS - 1));
+            (z * CELLS + y) * CELLS + x
+        };
+        let tasks = (0..self.count.div_ceil(GRAIN)).into_par_iter().map(|part| {
+            let end = self.count.min((part + 1).saturating_mul(GRAIN));
+            let mut parts = NONE;
+            for bounds in (part * GRAIN..end).map(|item| self.bounds(item)) {
+                let part = &mut parts[cell(&bounds)];
+                *part = part.union(bounds);
+            }
+            parts
+        });
+        let union = |a: [Bounds; _], b: [Bounds; _]| std::array::from_fn(|i| a[i].union(b[i]));
+        let parts = tasks.reduce(|| NONE, union);
+        parts.into_iter().filter(|part| !part.is_empty()).collect()
     }
 }
 
@@ -227,12 +258,18 @@ pub(super) struct Group {
     items: Vec<Item>,
     tree: Tree,
     bounds: Bounds,
+    /// Boxes that together hold what the tree holds; the world has none.
+    parts: Vec<Bounds>,
 }
 
 impl Group {
     /// A group of these members, and what the folder of trees was good for.
     pub(super) fn new(members: Members<'_>, recipe: &Recipe) -> (Self, CacheUse) {
         let bounds = members.union();
+        let parts = match members.instances {
+            Some(_) => Vec::new(),
+            None => members.parts(&bounds),
+        };
         let (tree, items, used) = match recipe.method {
             Method::Tree => Tree::build(&members, recipe.build, recipe.cache.as_deref()),
             Method::Brute | Method::Exhaustive => {
@@ -245,6 +282,7 @@ impl Group {
             unbounded: members.unbounded,
             tree,
             bounds,
+            parts,
         };
         (group, used)
     }
@@ -266,6 +304,15 @@ impl Group {
     /// A box around what the tree holds.
     pub(super) fn bounds(&self) -> Bounds {
         self.bounds
+    }
+
+    /// A box around an instance of the group. Turned one by one, the parts' boxes make a closer one than the whole's.
+    pub(super) fn bounds_in(&self, to_world: &Transform) -> Bounds {
+        if !self.unbounded.is_empty() {
+            return Bounds::EVERYTHING;
+        }
+        let parts = self.parts.iter().map(|part| part.transformed(to_world));
+        parts.fold(Bounds::EMPTY, Bounds::union)
     }
 
     pub(super) fn bytes(&self) -> usize {

@@ -14,6 +14,8 @@ mod wide;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use rayon::prelude::*;
+
 use crate::error::{Error, Problem};
 use crate::interaction::{Hit, Interaction, Ray};
 use crate::math::Transform;
@@ -174,24 +176,17 @@ impl Tracer {
             shapes_of[*group as usize].push(shape);
         }
         let mut cache = CacheUse::default();
-        let mut group = |of: &[u32], instances: &[Bounds]| {
+        let mut group = |of: &[u32], instances: Option<&[Bounds]>| {
             let (group, used) = Group::new(Members::new(&shapes, of, instances), &recipe);
             cache.add(used);
             group
         };
-        let groups = shapes_of[1..].iter().map(|of| group(of, &[]));
+        let groups = shapes_of[1..].iter().map(|of| group(of, None));
         let mut groups: Vec<Group> = groups.collect();
-        let instance_bounds: Vec<Bounds> = (instances.iter())
-            .map(|instance| {
-                let group = &groups[instance.group as usize - 1];
-                match group.bounds() {
-                    _ if !group.unbounded().is_empty() => Bounds::EVERYTHING,
-                    bounds if bounds.is_empty() => bounds,
-                    bounds => bounds.transformed(&instance.to_world),
-                }
-            })
+        let instance_bounds: Vec<Bounds> = (instances.par_iter())
+            .map(|Instance { to_world, group }| groups[*group as usize - 1].bounds_in(to_world))
             .collect();
-        let world = group(&shapes_of[0], &instance_bounds);
+        let world = group(&shapes_of[0], Some(&instance_bounds));
         groups.insert(0, world);
         let inner = groups[1..].iter().map(|group| group.tree().levels());
         Self {
@@ -279,6 +274,8 @@ fn to_local(to_world: &Transform, ray: &Ray) -> Ray {
     }
 }
 
+#[cfg(test)]
+mod instance_tests;
 #[cfg(test)]
 mod surface_tests;
 #[cfg(test)]

@@ -24,7 +24,7 @@ const POLYGON: &str = r#"type="polygon"><point name="p0" value="-1, -1, 0"/><poi
 const TRIANGLE: &str = r#"type="triangle"><point name="p0" value="-1, -1, 0"/><point name="p1" value="1, -1, 0"/>
     <point name="p2" value="0, 1, 0"/"#;
 
-fn uniform(seed: u64, i: u32) -> f32 {
+pub(super) fn uniform(seed: u64, i: u32) -> f32 {
     random::unit(random::bits(seed, i))
 }
 
@@ -33,7 +33,7 @@ fn square(seed: u64, i: u32) -> Vec2 {
 }
 
 /// A shape under a map.
-fn surface(what: &str, place: &DAffine3) -> Geometry {
+pub(super) fn surface(what: &str, place: &DAffine3) -> Geometry {
     let [x, y, z] = [0, 1, 2].map(|i| {
         let row = place.matrix3.row(i);
         format!("{} {} {} {}", row.x, row.y, row.z, place.translation[i])
@@ -68,7 +68,7 @@ fn meet<'t>(tracer: &'t Tracer, ray: &Ray) -> Option<Interaction<'t>> {
 }
 
 /// Stretches, shears and, every other time, mirrors.
-fn skew(i: u32) -> DAffine3 {
+pub(super) fn skew(i: u32) -> DAffine3 {
     let number = |n| f64::from(uniform(11, 32 * i + n)) - 0.5;
     let shear = DMat3::from_cols_array(&std::array::from_fn(|n| number(n as u32)));
     let mirror = if i.is_multiple_of(2) { 1.0 } else { -1.0 };

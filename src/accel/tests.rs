@@ -13,7 +13,7 @@ fn uniform(seed: u64, i: u32) -> f32 {
     random::unit(random::bits(seed, i))
 }
 
-fn direction(seed: u64, i: u32) -> Vec3 {
+pub(super) fn direction(seed: u64, i: u32) -> Vec3 {
     warp::uniform_sphere(Vec2::new(uniform(seed, 2 * i), uniform(seed, 2 * i + 1)))
 }
 
@@ -40,7 +40,7 @@ fn rays(count: u32, targets: &[Vec3]) -> Vec<Ray> {
 }
 
 /// Brute force, and the tree walked by every kernel.
-fn all(shapes: &[Arc<Geometry>], groups: &[u32], instances: &[Instance]) -> Vec<Tracer> {
+pub(super) fn all(shapes: &[Arc<Geometry>], groups: &[u32], instances: &[Instance]) -> Vec<Tracer> {
     let tracer = |method, build| {
         let recipe = Recipe {
             method,
@@ -58,7 +58,7 @@ fn all(shapes: &[Arc<Geometry>], groups: &[u32], instances: &[Instance]) -> Vec<
 }
 
 /// What all find alike: how many rays meet something.
-fn agree(tracers: &[Tracer], rays: &[Ray]) -> usize {
+pub(super) fn agree(tracers: &[Tracer], rays: &[Ray]) -> usize {
     let limited = rays.iter().enumerate().map(|(i, r)| Ray {
         t_max: r.t_max.min(uniform(9, i as u32) * 3.0),
         ..*r

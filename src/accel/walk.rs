@@ -292,18 +292,45 @@ impl<'t, L: Ledger + ?Sized, const ANY: bool> Party<'_, 't, '_, L, ANY> {
     }
 
     /// The tree of an instance, and how it is entered.
-    fn instance(&self, visit: &Visit, instance: u32) -> Option<Met<'t>> {
+    #[inline(always)]
+    fn instance(&self, visit: &Visit, instance: u32) -> Met<'t> {
         let tracer = self.walk.tracer;
-        let bounds = &tracer.instance_bounds[instance as usize];
-        let entry = visit.boxes.entry(bounds, visit.best.t)?;
         let Instance { to_world, group } = &tracer.instances[instance as usize];
+        let best = if visit.best.is_inside() {
+            // A triangle of the world, which comes after those of all instances.
+            Best {
+                id: u32::MAX,
+                place: Place::OUTSIDE,
+                ..visit.best
+            }
+        } else {
+            self.best(&self.ledger.hit(visit.ray), instance)
+        };
         let start = Start {
             ray: to_local(to_world, &self.rays[visit.ray]),
             instance,
-            entry,
-            best: self.best(&self.known(visit), instance),
+            entry: visit.reached,
+            best,
         };
-        Some(Met::Instance(tracer.groups[*group as usize].tree(), start))
+        Met::Instance(tracer.groups[*group as usize].tree(), start)
+    }
+
+    /// Meets a primitive that is no triangle.
+    #[inline(never)]
+    fn primitive(&mut self, visit: &Visit, way: Way, item: &Item) -> Met<'t> {
+        let from = if visit.instance == self.way.instance {
+            self.rays[visit.ray]
+        } else {
+            let Instance { to_world, .. } = &self.walk.tracer.instances[visit.instance as usize];
+            to_local(to_world, &self.rays[visit.ray])
+        };
+        let mut hit = self.known(visit);
+        let prepared = (&visit.boxes, &visit.shear);
+        if !(self.walk).primitive(item, &from, prepared, way, &mut hit) {
+            return Met::Nothing;
+        }
+        self.ledger.improve(visit.ray, hit);
+        Met::Better(self.best(&hit, visit.instance))
     }
 }
 
@@ -318,31 +345,23 @@ impl<'t, L: Ledger + ?Sized, const ANY: bool> Walker<'t> for Party<'_, 't, '_, L
         }
     }
 
+    #[inline(always)]
     fn other(&mut self, visit: &Visit, item: u32) -> Met<'t> {
         let tracer = self.walk.tracer;
-        let outside = visit.instance == self.way.instance;
-        let (way, from) = if outside {
-            (self.way, self.rays[visit.ray])
+        let way = if visit.instance == self.way.instance {
+            self.way
         } else {
-            let Instance { to_world, group } = &tracer.instances[visit.instance as usize];
-            let way = Way {
-                group: *group,
+            Way {
+                group: tracer.instances[visit.instance as usize].group,
                 instance: visit.instance,
                 entry: visit.entry,
-            };
-            (way, to_local(to_world, &self.rays[visit.ray]))
+            }
         };
-        let item = tracer.groups[way.group as usize].items()[item as usize];
-        if let Some(instance) = item.as_instance() {
-            return self.instance(visit, instance).unwrap_or(Met::Nothing);
+        let item = &tracer.groups[way.group as usize].items()[item as usize];
+        match item.as_instance() {
+            Some(instance) => self.instance(visit, instance),
+            None => self.primitive(visit, way, item),
         }
-        let mut hit = self.known(visit);
-        let prepared = (&visit.boxes, &visit.shear);
-        if !(self.walk).primitive(&item, &from, prepared, way, &mut hit) {
-            return Met::Nothing;
-        }
-        self.ledger.improve(visit.ray, hit);
-        Met::Better(self.best(&hit, visit.instance))
     }
 
     #[inline(always)]

@@ -156,7 +156,7 @@ struct Plan<'a> {
     /// The shapegroups' numbers, from 1.
     groups: HashMap<NodeId, u32>,
     instances: Vec<Instance>,
-    /// How many shapes were met, each as often as it is referred to.
+    /// How many shapes were met in groups, each as often as it is referred to.
     met: usize,
     problems: Problems,
 }
@@ -164,8 +164,8 @@ struct Plan<'a> {
 impl<'a> Plan<'a> {
     /// Notes what a shape stands for in its space.
     fn place(&mut self, properties: Properties<'a>, space: &Space<'a>) -> Result<()> {
-        self.met += 1;
-        if self.met > MAX_SHAPES && !space.top {
+        self.met += usize::from(!space.top);
+        if self.met > MAX_SHAPES {
             let message = format!("groups stand for more than {MAX_SHAPES} shapes");
             return Err(properties
                 .error("", message)

@@ -188,21 +188,22 @@ pub fn light_names(description: &Description) -> Vec<String> {
 struct LightNames {
     names: Vec<String>,
     taken: HashSet<String>,
+    /// Shapes in groups.
     visited: usize,
 }
 
 impl LightNames {
     /// In the order in which [`Assets::load`] flattens groups, and no further than it does.
     fn visit(&mut self, shape: &Properties<'_>) {
-        self.visited += 1;
-        if self.visited > MAX_SHAPES {
-            return;
-        }
         for light in shape.peek_children(Kind::Emitter) {
             self.add(light.id().or(shape.id()));
         }
         if shape.peek_plugin() == shape::NODE {
             for child in shape.peek_children(Kind::Shape) {
+                self.visited += 1;
+                if self.visited > MAX_SHAPES {
+                    return;
+                }
                 self.visit(&child);
             }
         }

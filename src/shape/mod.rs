@@ -77,22 +77,28 @@ impl Bounds {
         }
     }
 
-    /// A box around the box's image, with room for rounding.
+    /// A box around the box's image, with room for rounding: each product of the matrix is least or greatest at one
+    /// of two planes (Arvo, "Transforming axis-aligned bounding boxes", *Graphics Gems*, 1990).
     #[must_use]
     pub fn transformed(self, transform: &Transform) -> Self {
-        let mut bounds = Self::EMPTY;
-        for corner in 0..8 {
-            let pick =
-                |bit: u32, low: f32, high: f32| if corner >> bit & 1 == 0 { low } else { high };
-            let p = Vec3::new(
-                pick(0, self.min.x, self.max.x),
-                pick(1, self.min.y, self.max.y),
-                pick(2, self.min.z, self.max.z),
-            );
-            let (image, error) = (transform.point(p), transform.point_error(p, Vec3::ZERO));
-            bounds = bounds.with(image - error).with(image + error);
+        if self.is_empty() {
+            return self;
         }
-        bounds
+        let linear = transform.linear();
+        let (mut min, mut max) = (Vec3::ZERO, Vec3::ZERO);
+        for axis in 0..3 {
+            let column = linear.col(axis);
+            let (low, high) = (column * self.min[axis], column * self.max[axis]);
+            min += low.min(high);
+            max += low.max(high);
+        }
+        let farthest = self.min.abs().max(self.max.abs());
+        let error = transform.point_error(farthest, Vec3::ZERO);
+        let origin = transform.translation();
+        Self {
+            min: min + origin - error,
+            max: max + origin + error,
+        }
     }
 
     /// Whether it contains nothing.

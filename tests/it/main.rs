@@ -10,6 +10,7 @@ mod compare;
 mod crosscheck;
 mod golden;
 mod inputs;
+mod instances;
 mod layers;
 mod lights;
 mod mesh;

@@ -144,7 +144,10 @@ impl Stacks {
                 found::<W, ANY>(walker, ray);
                 ray.enter(tree, &walker.start(ray.ray as usize));
             } else {
-                match walker.other(&ray.visit(), ray.current & OTHER_INDEX) {
+                // SAFETY: what the ray is at was taken from its top.
+                let entry = unsafe { *self.start.add(ray.top as usize) };
+                let reached = f32::from_bits((entry >> 32) as u32);
+                match walker.other(&ray.visit(reached), ray.current & OTHER_INDEX) {
                     Met::Nothing => {}
                     Met::Better(Best { t, id, place }) => {
                         ray.reach(t);

@@ -34,6 +34,8 @@ pub(in crate::accel) struct Visit {
     pub(in crate::accel) instance: u32,
     /// Where it entered that.
     pub(in crate::accel) entry: f32,
+    /// Where it enters the item's box.
+    pub(in crate::accel) reached: f32,
     pub(in crate::accel) best: Best,
     /// In the space of the tree that the ray is in.
     pub(in crate::accel) boxes: RayBoxes,
@@ -214,11 +216,12 @@ impl State {
 
     /// What a walker is told.
     #[inline(always)]
-    pub(super) fn visit(&self) -> Visit {
+    pub(super) fn visit(&self, reached: f32) -> Visit {
         Visit {
             ray: self.ray as usize,
             instance: self.instance,
             entry: self.entry,
+            reached,
             best: self.best(),
             boxes: self.boxes(),
             shear: self.shear(),
