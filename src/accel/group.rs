@@ -163,11 +163,13 @@ impl<'a> Members<'a> {
         }
     }
 
+    #[inline]
     fn item(&self, number: u32) -> Item {
         let run = self.runs.partition_point(|run| run.start <= number) - 1;
         self.runs[run].item(number)
     }
 
+    #[inline]
     fn bounds_of(&self, item: Item) -> Bounds {
         match item.as_instance() {
             Some(instance) => self.instances[instance as usize],
@@ -232,13 +234,16 @@ pub(super) struct Group {
 impl Group {
     /// A group of these members, and what the folder of trees was good for.
     pub(super) fn new(members: Members<'_>, recipe: &Recipe) -> (Self, CacheUse) {
-        let bounds = members.union();
         let (tree, items, used) = match recipe.method {
             Method::Tree => Tree::build(&members, recipe.build, recipe.cache.as_deref()),
             Method::Brute => {
                 let all = (0..members.count).collect();
                 (Tree::default(), all, CacheUse::default())
             }
+        };
+        let bounds = match recipe.method {
+            Method::Tree => tree.bounds(),
+            Method::Brute => members.union(),
         };
         let group = Self {
             items: items.into_iter().map(|item| members.item(item)).collect(),
