@@ -170,11 +170,13 @@ impl<'a> Members<'a> {
         }
     }
 
+    #[inline]
     fn item(&self, number: u32) -> Item {
         let run = self.runs.partition_point(|run| run.start <= number) - 1;
         self.runs[run].item(number)
     }
 
+    #[inline]
     fn bounds_of(&self, item: Item) -> Bounds {
         match item.as_instance() {
             Some(instance) => self.boxes()[instance as usize],
@@ -265,17 +267,20 @@ pub(super) struct Group {
 impl Group {
     /// A group of these members, and what the folder of trees was good for.
     pub(super) fn new(members: Members<'_>, recipe: &Recipe) -> (Self, CacheUse) {
-        let bounds = members.union();
-        let parts = match members.instances {
-            Some(_) => Vec::new(),
-            None => members.parts(&bounds),
-        };
         let (tree, items, used) = match recipe.method {
             Method::Tree => Tree::build(&members, recipe.build, recipe.cache.as_deref()),
             Method::Brute | Method::Exhaustive => {
                 let all = (0..members.count).collect();
                 (Tree::default(), all, CacheUse::default())
             }
+        };
+        let bounds = match recipe.method {
+            Method::Tree => tree.bounds(),
+            Method::Brute | Method::Exhaustive => members.union(),
+        };
+        let parts = match members.instances {
+            Some(_) => Vec::new(),
+            None => members.parts(&bounds),
         };
         let group = Self {
             items: items.into_iter().map(|item| members.item(item)).collect(),

@@ -1,9 +1,14 @@
 //! 8-bit sRGB: code = round(255 · curve(x)) of linear BT.709 values clamped to [0, 1], with the curve of
 //! [`crate::color::srgb`]. NaN becomes 0. Opacity has no curve.
 
+use rayon::prelude::*;
+
 use crate::color::srgb;
 use crate::error::{Error, Result};
 use crate::image::{Codes, Image, Layout};
+
+/// Pixels that one task encodes.
+const GRAIN: usize = 1 << 13;
 
 /// The 8-bit code of linear light `x`, the nearest one.
 pub fn encode_value(x: f32) -> u8 {
@@ -34,11 +39,17 @@ pub fn encode(image: &Image) -> Result<Codes> {
     };
     let colour = if grey { &rgb[..1] } else { &rgb[..] };
     let pixels = image.width() as usize * image.height() as usize;
-    let mut codes = Vec::with_capacity(pixels * layout.channels());
-    for pixel in image.data().chunks_exact(image.channels().len()) {
-        codes.extend(colour.iter().map(|&c| encode_value(pixel[c])));
-        codes.extend(alpha.map(|a| quantise(clamp(pixel[a]))));
-    }
+    let mut codes = vec![0; pixels * layout.channels()];
+    let coded = codes.par_chunks_exact_mut(layout.channels());
+    let pixels = image.data().par_chunks_exact(image.channels().len());
+    (coded.zip(pixels).with_min_len(GRAIN)).for_each(|(codes, pixel)| {
+        for (code, &c) in codes.iter_mut().zip(colour) {
+            *code = encode_value(pixel[c]);
+        }
+        if let (Some(a), Some(code)) = (alpha, codes.last_mut()) {
+            *code = quantise(clamp(pixel[a]));
+        }
+    });
     Codes::new(image.width(), image.height(), layout, codes)
 }
 

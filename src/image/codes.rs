@@ -94,7 +94,8 @@ impl Codes {
             Layout::Rgba => ExtendedColorType::Rgba8,
         };
         let mut bytes = Vec::new();
-        PngEncoder::new_with_quality(&mut bytes, CompressionType::Default, FilterType::Adaptive)
+        // Noise hardly gets smaller by more work.
+        PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Adaptive)
             .write_image(&self.data, self.width, self.height, color)
             .map_err(|e| Error::input(format!("the image cannot be stored as PNG: {e}")))?;
         Ok(bytes)

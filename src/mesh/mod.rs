@@ -108,11 +108,12 @@ impl Mesh {
         self.triangles
             .par_chunks(GRAIN)
             .map(|triangles| {
-                let corners = triangles.iter().flat_map(|t| self.corners(t));
-                corners.fold(
-                    (Vec3::INFINITY, Vec3::NEG_INFINITY),
-                    |(low, high), corner| (low.min(corner), high.max(corner)),
-                )
+                let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+                for i in triangles.as_flattened() {
+                    let corner = self.positions[*i as usize];
+                    (low, high) = (low.min(corner), high.max(corner));
+                }
+                (low, high)
             })
             .reduce_with(|a, b| (a.0.min(b.0), a.1.max(b.1)))
     }

@@ -27,6 +27,7 @@ pub(super) fn shared(
 ) -> Vec<Vec3> {
     let mut sums = vec![Vec3::ZERO; positions.len()];
     let mut shares = Vec::new();
+    let band = sums.len().div_ceil(rayon::current_num_threads()).max(GRAIN);
     // The angles are the work, and are found in parallel for some triangles at a time; the sums follow.
     for triangles in triangles.chunks(16 * GRAIN) {
         let of = |t: &[u32; 3]| corner_normals(t.map(|i| positions[i as usize]));
@@ -35,11 +36,17 @@ pub(super) fn shared(
             .with_min_len(GRAIN)
             .map(of)
             .collect_into_vec(&mut shares);
-        for (triangle, share) in triangles.iter().zip(&shares) {
-            for (&vertex, &normal) in triangle.iter().zip(share) {
-                sums[first(vertex) as usize] += normal;
+        // Each thread goes through all of them, and adds what belongs to its own vertices.
+        sums.par_chunks_mut(band).enumerate().for_each(|(i, sums)| {
+            for (triangle, share) in triangles.iter().zip(&shares) {
+                for (&vertex, &normal) in triangle.iter().zip(share) {
+                    let place = (first(vertex) as usize).wrapping_sub(i * band);
+                    if let Some(sum) = sums.get_mut(place) {
+                        *sum += normal;
+                    }
+                }
             }
-        }
+        });
     }
     sums.par_iter_mut()
         .with_min_len(GRAIN)
@@ -88,11 +95,12 @@ fn angle(y: f64, x: f64) -> f64 {
     let t = less / more;
     let squared = t * t;
     let series = TERMS.iter().fold(0.0, |sum, term| (sum + term) * squared);
-    let mut angle = t + t * series;
-    if y > x.abs() {
-        angle = FRAC_PI_2 - angle;
-    }
-    if x < 0.0 { PI - angle } else { angle }
+    // Looked up, not branched on: nobody can foretell it.
+    let turned = |angle: f64, whole: f64, is_turned: bool| {
+        [0.0, whole][usize::from(is_turned)] + [1.0, -1.0][usize::from(is_turned)] * angle
+    };
+    let angle = turned(t + t * series, FRAC_PI_2, y > x.abs());
+    turned(angle, PI, x < 0.0)
 }
 
 #[cfg(test)]

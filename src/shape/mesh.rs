@@ -147,10 +147,13 @@ impl Surface for TriangleMesh {
         self.mesh.triangles.len() as u32
     }
 
+    #[inline]
     fn bounds(&self, primitive: u32) -> Bounds {
-        self.corners(primitive)
-            .into_iter()
-            .fold(Bounds::EMPTY, Bounds::with)
+        let [a, b, c] = self.corners(primitive);
+        Bounds {
+            min: a.min(b).min(c),
+            max: a.max(b).max(c),
+        }
     }
 
     fn intersect(&self, _primitive: u32, _ray: &Ray) -> Option<(f32, f32, f32)> {

@@ -61,6 +61,7 @@ impl Bounds {
 
     /// The smallest box around both.
     #[must_use]
+    #[inline]
     pub fn union(self, other: Self) -> Self {
         Self {
             min: self.min.min(other.min),
@@ -70,6 +71,7 @@ impl Bounds {
 
     /// The smallest box around this and `point`.
     #[must_use]
+    #[inline]
     pub fn with(self, point: Vec3) -> Self {
         Self {
             min: self.min.min(point),

@@ -60,17 +60,19 @@ impl Place<'_> {
         let mut others = Vec::new();
         let mut blocks = (before.blocks..).zip(self.blocks);
         let child = |items: &[u32]| {
-            let boxes = items.iter().map(|item| leaves.bounds(*item));
-            let bounds = boxes.fold(Bounds::EMPTY, Bounds::union);
             if let [item] = items
                 && !leaves.is_triangle(*item)
             {
                 others.push(*item);
-                return Head::leaf(OTHER | (before.others + others.len() - 1) as u32, bounds);
+                let name = OTHER | (before.others + others.len() - 1) as u32;
+                return Head::leaf(name, leaves.bounds(*item));
             }
+            let mut bounds = Bounds::EMPTY;
             let mut triangles = [Default::default(); BLOCK];
             for (triangle, item) in triangles.iter_mut().zip(items) {
                 *triangle = leaves.triangle(*item);
+                let (_, [a, b, c]) = *triangle;
+                bounds = bounds.with(a).with(b).with(c);
             }
             let (index, block) = blocks.next().expect("blocks were counted");
             *block = Block::new(&mut triangles[..items.len()]);

@@ -64,7 +64,7 @@ pub(super) enum Met<'t> {
 pub(super) trait Leaves: Sync {
     /// How many there are.
     fn count(&self) -> u32;
-    /// An item's box, finite and not empty.
+    /// An item's box, finite and not empty; a triangle's is around its corners.
     fn bounds(&self, item: u32) -> Bounds;
     /// Whether an item is a triangle.
     fn is_triangle(&self, item: u32) -> bool;
@@ -115,6 +115,19 @@ impl Tree {
         drop(boxes); // before the nodes take memory
         let (tree, others) = sketches.tree(leaves);
         (tree, others, used)
+    }
+
+    /// A box around all items.
+    pub(super) fn bounds(&self) -> Bounds {
+        let [low, high] = [0, 1].map(|side| [0, 2, 4].map(|axis| self.nodes[0].slabs[axis + side]));
+        Bounds {
+            min: low
+                .map(|low| low.into_iter().fold(f32::INFINITY, f32::min))
+                .into(),
+            max: high
+                .map(|high| high.into_iter().fold(f32::NEG_INFINITY, f32::max))
+                .into(),
+        }
     }
 
     /// Nodes on the longest way down.
