@@ -106,11 +106,10 @@ impl Stage {
                         path.display()
                     )));
                 }
-                let up = match up {
-                    UpAxis::Y => Vec3::Y,
-                    UpAxis::Z => Vec3::Z,
-                };
-                Source::Mesh { mesh, up }
+                Source::Mesh {
+                    mesh,
+                    up: up.direction(),
+                }
             }
             Subject::Scene { path, options } => {
                 let description = Description::read(path, options)?;

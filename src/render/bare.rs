@@ -22,6 +22,16 @@ pub enum UpAxis {
     Z,
 }
 
+impl UpAxis {
+    /// Of unit length.
+    pub fn direction(self) -> Vec3 {
+        match self {
+            Self::Y => Vec3::Y,
+            Self::Z => Vec3::Z,
+        }
+    }
+}
+
 /// Whether the file's extension is a mesh's.
 pub fn is_mesh(path: &Path) -> bool {
     plugin(path).is_some()
@@ -74,10 +84,7 @@ pub fn describe_mesh(path: &Path, up: UpAxis, options: &Options) -> Result<BareM
             path.display()
         )));
     };
-    let up = match up {
-        UpAxis::Y => Vec3::Y,
-        UpAxis::Z => Vec3::Z,
-    };
+    let up = up.direction();
     let camera = match plugin {
         "gltf" => read_gltf(path, &read_options)?.camera,
         _ => None,

@@ -70,20 +70,22 @@ struct Ask<'a> {
     progress: &'a dyn Progress,
 }
 
+impl Ask<'_> {
+    /// Everything that is needed, with the scene in memory.
+    fn job<C: ColorModel>(&mut self, color: C) -> Result<Job<'_, C>> {
+        let (description, options) = (self.description, self.options);
+        prepare::prepare(self.shelf, description, options, color, self.progress)
+    }
+}
+
 /// Makes sure that the scene is in memory and tells of it.
 struct Measure<'a>(Ask<'a>);
 
 impl Task for Measure<'_> {
     type Output = Facts;
 
-    fn run<C: ColorModel>(self, color: C) -> Result<Facts> {
-        let Ask {
-            shelf,
-            description,
-            options,
-            progress,
-        } = self.0;
-        let job = prepare::prepare(shelf, description, options, color, progress)?;
+    fn run<C: ColorModel>(mut self, color: C) -> Result<Facts> {
+        let job = self.0.job(color)?;
         let mut facts = job.facts.clone();
         facts.warnings = job.warnings;
         Ok(facts)
@@ -96,14 +98,14 @@ struct Render<'a>(Ask<'a>);
 impl Task for Render<'_> {
     type Output = Rendered;
 
-    fn run<C: ColorModel>(self, color: C) -> Result<Rendered> {
+    fn run<C: ColorModel>(mut self, color: C) -> Result<Rendered> {
         let Ask {
-            shelf,
             description,
             options,
             progress,
+            ..
         } = self.0;
-        let job = prepare::prepare(shelf, description, options, color, progress)?;
+        let job = self.0.job(color)?;
         let mut keeper = match &options.checkpoint {
             Some(checkpoint) => {
                 let fingerprint = job.fingerprint(description, options)?;
@@ -143,7 +145,7 @@ impl Task for Render<'_> {
             report,
             warnings,
         };
-        if let Some(kept) = &mut shelf.kept {
+        if let Some(kept) = &mut self.0.shelf.kept {
             kept.told();
         }
         Ok(rendered)
@@ -156,15 +158,9 @@ struct Warm<'a>(Ask<'a>);
 impl Task for Warm<'_> {
     type Output = Heat;
 
-    fn run<C: ColorModel>(self, color: C) -> Result<Heat> {
-        let Ask {
-            shelf,
-            description,
-            options,
-            progress,
-        } = self.0;
-        let job = prepare::prepare(shelf, description, options, color, progress)?;
-        heat::count(&job, progress)
+    fn run<C: ColorModel>(mut self, color: C) -> Result<Heat> {
+        let progress = self.0.progress;
+        heat::count(&self.0.job(color)?, progress)
     }
 }
 
