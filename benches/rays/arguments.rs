@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Parser;
 
 use crate::meshes::Named;
+use crate::ours;
 
 /// Measures Étendue's rays beside those of obvhs and, where EMBREE_LIB names its library, of Embree 4.
 #[derive(Debug, Parser)]
@@ -26,6 +27,10 @@ pub(crate) struct Arguments {
     #[arg(long)]
     pub(crate) once: bool,
 
+    /// Of the others only these, by their names in the report; e.g. `Embree`
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    beside: Vec<String>,
+
     /// Also write what was measured, as JSON
     #[arg(long, value_name = "FILE")]
     pub(crate) json: Option<PathBuf>,
@@ -43,6 +48,11 @@ impl Arguments {
         }
         let quick = |name: &Named| !(self.quick && *name == Named::Terrain);
         Named::ALL.into_iter().filter(quick).collect()
+    }
+
+    /// Whether a tracer of this name is measured.
+    pub(crate) fn wants(&self, name: &str) -> bool {
+        self.beside.is_empty() || name == ours::NAME || self.beside.iter().any(|n| n == name)
     }
 
     /// How many rays a set has.

@@ -3,6 +3,7 @@
 //!     cargo bench --bench rays                                       # everything that is there
 //!     EMBREE_LIB=$(tools/embree) cargo bench --bench rays            # with Embree
 //!     cargo bench --bench rays -- bunny dragon --repeat 9            # only these, more rounds
+//!     cargo bench --bench rays -- crown --once --beside Embree       # only these two
 //!     cargo bench --bench rays -- --quick --json target/rays.json    # fewer rays, no terrain
 //!
 //! The tracers take turns in each round, each with one thread and with two, so that what disturbs the machine
@@ -53,6 +54,7 @@ fn run(arguments: &Arguments) -> Result<(), String> {
         .into_iter()
         .chain(obvhs::makers())
         .chain(embree.iter().flat_map(embree::makers))
+        .filter(|maker| arguments.wants(maker.name))
         .collect();
     let mut report = Report::default();
     for name in arguments.meshes() {
