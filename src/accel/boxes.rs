@@ -22,9 +22,9 @@ pub(super) struct RayBoxes {
 pub(super) const WIDEN: f32 = 1.000_000_5;
 /// The smallest component of a direction that is inverted as it is; its inverse times any coordinate
 /// below 10¹⁸ stays finite.
-const SMALLEST: f32 = 1e-20;
+pub(super) const SMALLEST: f32 = 1e-20;
 /// Twice what is lost by rounding a product and then its sum with this part of it.
-const LOST: f32 = 2.0 * f32::EPSILON;
+pub(super) const LOST: f32 = 2.0 * f32::EPSILON;
 
 impl RayBoxes {
     #[inline]

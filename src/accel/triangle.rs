@@ -20,11 +20,11 @@ pub(super) struct Shear {
 
 /// The axis of the greatest of three, by whether the first is greater than the second, the first than the third,
 /// and the second than the third.
-const GREATEST: [usize; 8] = [2, 2, 2, 0, 1, 2, 1, 0];
+pub(super) const GREATEST: [usize; 8] = [2, 2, 2, 0, 1, 2, 1, 0];
 
 /// For each axis as z the other two: in their order, and changed round for a ray that goes backwards along z, so
 /// that winding is kept.
-const AXES: [[[usize; 3]; 2]; 3] = [
+pub(super) const AXES: [[[usize; 3]; 2]; 3] = [
     [[1, 2, 0], [2, 1, 0]],
     [[2, 0, 1], [0, 2, 1]],
     [[0, 1, 2], [1, 0, 2]],

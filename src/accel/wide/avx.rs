@@ -7,11 +7,16 @@
 
 use std::arch::x86_64::*;
 use std::hint::select_unpredictable;
+use std::mem::offset_of;
 
-use super::kernel::Lanes;
-use super::node::{BLOCK, Block, Entry, Node};
-use super::state::State;
-use crate::accel::boxes::WIDEN;
+use glam::Vec3;
+
+use super::kernel::{Ends, Lanes};
+use super::node::{BLOCK, Block, Entry, Node, WIDTH};
+use super::state::{BLOCK_AXIS, NEAR, State};
+use crate::accel::boxes::{LOST, SMALLEST, WIDEN};
+use crate::accel::triangle::{AXES, GREATEST, greatest};
+use crate::interaction::Ray;
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Avx2;
@@ -35,6 +40,74 @@ static PACKED: [u64; 256] = {
     }
     table
 };
+
+/// How a shear's axes are taken from a vector, by its z and whether the ray goes backwards along that: as places
+/// in the vector, and in a block in bytes.
+static SHEARED: [([u32; 4], [u8; 3]); 6] = {
+    let mut sheared = [([0; 4], [0; 3]); 6];
+    let mut i = 0;
+    while i < 18 {
+        let (way, to) = (i / 3, i % 3);
+        let from = AXES[way / 2][way % 2][to];
+        sheared[way].0[to] = from as u32;
+        sheared[way].1[to] = from as u8 * BLOCK_AXIS;
+        i += 1;
+    }
+    sheared
+};
+
+/// What [`Lanes::aim`] says: [`RayBoxes::new`](crate::accel::boxes::RayBoxes::new) and [`Shear::new`] in lanes.
+/// Fields are written four numbers at a time, each over the end of the one before.
+///
+/// # Safety
+/// The processor has AVX2 and FMA.
+#[inline(always)]
+pub(super) unsafe fn aim(ray: &Ray, state: &mut State) -> bool {
+    // SAFETY: the caller has the instructions; the state's layout is C's, where behind each of these fields there
+    // is a number more; an index into a table is below its length.
+    unsafe {
+        // Not loaded four at a time: the ray was just written, in other pieces, which is slow.
+        let lanes = |v: Vec3| _mm_setr_ps(v.x, v.y, v.z, 0.0);
+        let state = &raw mut *state;
+        let start = state.cast::<f32>();
+        let store = |offset: usize, lanes: __m128| _mm_storeu_ps(start.byte_add(offset), lanes);
+        let (origin, direction) = (lanes(ray.origin), lanes(ray.direction));
+        let (zero, sign) = (_mm_setzero_ps(), _mm_set1_ps(-0.0));
+        let length = _mm_andnot_ps(sign, direction);
+        let smallest = _mm_set1_ps(SMALLEST);
+        let bounded = _mm_blendv_ps(
+            direction,
+            _mm_or_ps(smallest, _mm_and_ps(sign, direction)),
+            _mm_cmplt_ps(length, smallest),
+        );
+        let inverse = _mm_div_ps(_mm_set1_ps(1.0), bounded);
+        let middle = _mm_xor_ps(sign, _mm_mul_ps(origin, inverse));
+        let lost = _mm_mul_ps(_mm_set1_ps(LOST), _mm_andnot_ps(sign, middle));
+        store(offset_of!(State, inverse), inverse);
+        store(offset_of!(State, entering), _mm_sub_ps(middle, lost));
+        store(offset_of!(State, leaving), _mm_add_ps(middle, lost));
+        let octant = _mm_movemask_ps(_mm_cmplt_ps(inverse, zero)) as usize & 7;
+        ((*state).near, (*state).octant) = (*NEAR.get_unchecked(octant), octant as u8);
+        let greater = _mm_cmpgt_ps(
+            _mm_shuffle_ps::<0b01_00_00>(length, length),
+            _mm_shuffle_ps::<0b10_10_01>(length, length),
+        );
+        let greatest = *GREATEST.get_unchecked(_mm_movemask_ps(greater) as usize & 7);
+        let backward = _mm_movemask_ps(_mm_cmplt_ps(direction, zero)) as usize >> greatest & 1;
+        let (places, axes) = SHEARED.get_unchecked(2 * greatest + backward);
+        let places = _mm_loadu_si128(places.as_ptr().cast());
+        let sheared = _mm_permutevar_ps(direction, places);
+        let shear = _mm_div_ps(sheared, _mm_shuffle_ps::<0b10_10_10_10>(sheared, sheared));
+        store(offset_of!(State, origin), origin);
+        store(offset_of!(State, direction), direction);
+        let sheared_origin = _mm_permutevar_ps(origin, places);
+        store(offset_of!(State, sheared_origin), sheared_origin);
+        store(offset_of!(State, shear), shear);
+        (*state).axes = *axes;
+        let nought = _mm_add_ps(_mm_mul_ps(zero, origin), _mm_mul_ps(zero, direction));
+        _mm_movemask_ps(_mm_cmpeq_ps(nought, zero)) & 7 == 7
+    }
+}
 
 /// Where the ray enters each child of a node, and where it leaves it or ends.
 ///
@@ -67,6 +140,12 @@ pub(super) unsafe fn slabs(node: &Node, ray: &State) -> (__m256, __m256) {
 
 // SAFETY: the functions are expanded where AVX2 and FMA may be used.
 unsafe impl Lanes for Avx2 {
+    #[inline(always)]
+    unsafe fn aim(ray: &Ray, state: &mut State) -> bool {
+        // SAFETY: the caller has what is needed.
+        unsafe { aim(ray, state) }
+    }
+
     #[inline(always)]
     unsafe fn enter(node: &Node, ray: &State, stack: *mut Entry) -> u32 {
         // SAFETY: the caller has AVX2 and FMA and room for eight entries; a mask has eight bits, an octant three.
@@ -102,8 +181,9 @@ unsafe impl Lanes for Avx2 {
                 let beyond = _mm256_cmpgt_epi64(four, bound);
                 _mm256_movemask_pd(_mm256_castsi256_pd(beyond)) as u32
             };
-            let within = !(beyond(0) | beyond(4) << 4) & 0xff;
-            31 - (within | 1).leading_zeros()
+            // From the top of a word: the instruction that counts from below is a slow one.
+            let beyond = beyond(0) << 24 | beyond(4) << 28;
+            7 - (!beyond | 1 << 24).leading_zeros()
         }
     }
 
@@ -156,75 +236,106 @@ unsafe impl Lanes for Avx2 {
         // SAFETY: the caller has what is needed.
         unsafe { meet(block, ray) }
     }
+
+    #[inline(always)]
+    unsafe fn file(slots: *const u32, currents: *const u32, count: usize, ends: &mut Ends) {
+        for first in (0..count).step_by(WIDTH) {
+            // SAFETY: the caller has AVX2, and room for whole groups in each array; a mask has eight bits.
+            unsafe {
+                let there = 0xff >> WIDTH.saturating_sub(count - first);
+                let slots = _mm256_loadu_si256(slots.add(first).cast());
+                let currents = _mm256_loadu_si256(currents.add(first).cast());
+                let signs = |x: __m256i| _mm256_movemask_ps(_mm256_castsi256_ps(x)) as u32;
+                let leaf = signs(currents);
+                // Both of the highest bits.
+                let rest = leaf & signs(_mm256_slli_epi32::<1>(currents));
+                let put = |end: &mut *mut u32, lanes: u32| {
+                    let packed = _mm_cvtsi64_si128(*PACKED.get_unchecked(lanes as usize) as i64);
+                    let packed = _mm256_cvtepu8_epi32(packed);
+                    let packed = _mm256_permute4x64_epi64::<0b11_01_10_00>(packed);
+                    let lanes_slots = _mm256_permutevar8x32_epi32(slots, packed);
+                    _mm256_storeu_si256(end.cast(), lanes_slots);
+                    *end = end.add(lanes.count_ones() as usize);
+                };
+                put(&mut ends.nodes, there & !leaf);
+                put(&mut ends.leaves, there & leaf & !rest);
+                put(&mut ends.rest, there & rest);
+            }
+        }
+    }
 }
 
-/// What [`Lanes::meet`] says.
+/// What [`Lanes::meet`] says: lane by lane, for seldom is there more than one.
 ///
 /// # Safety
 /// The processor has AVX2 and FMA.
 #[inline(always)]
 pub(super) unsafe fn meet(block: &Block, ray: &State) -> (f32, usize) {
-    // SAFETY: the caller has AVX2; loads are of whole rows of the block.
+    let mut best = (f32::NAN, 0);
+    let mut lanes = u32::from(ray.lanes);
+    while lanes != 0 {
+        let lane = lanes.trailing_zeros() as usize & (BLOCK - 1);
+        // SAFETY: the caller's word.
+        let t = unsafe { distance(block, lane, ray) };
+        // The first of equal ones has the smallest number.
+        let better = (t < best.0) | best.0.is_nan();
+        best.0 = select_unpredictable(better, t, best.0);
+        best.1 = select_unpredictable(better, lane, best.1);
+        lanes &= lanes - 1;
+    }
+    best
+}
+
+/// Where the ray, whose line goes through the triangle in this lane, meets it; not a number where it does not.
+///
+/// # Safety
+/// The processor has AVX2 and FMA, and the block this lane.
+#[inline(always)]
+unsafe fn distance(block: &Block, lane: usize, ray: &State) -> f32 {
+    // SAFETY: the caller has the instructions; four values from these fields on are in the ray.
     unsafe {
-        let corner = |axis: usize, corner: usize| _mm_load_ps(block.corners[axis][corner].as_ptr());
-        // The distance, in double precision: Shear::distance.
-        let mut a = [_mm256_setzero_pd(); 3];
-        let (mut ab, mut ac) = (a, a);
-        for axis in 0..3 {
-            let origin = _mm256_cvtps_pd(_mm_set1_ps(ray.origin[axis]));
-            let [p, q, r] = [0, 1, 2].map(|c| _mm256_cvtps_pd(corner(axis, c)));
-            a[axis] = _mm256_sub_pd(p, origin);
-            ab[axis] = _mm256_sub_pd(q, p);
-            ac[axis] = _mm256_sub_pd(r, p);
-        }
-        let mut normal = a;
-        for (axis, normal) in normal.iter_mut().enumerate() {
-            let (y, z) = ((axis + 1) % 3, (axis + 2) % 3);
-            *normal = _mm256_sub_pd(_mm256_mul_pd(ab[y], ac[z]), _mm256_mul_pd(ac[y], ab[z]));
-        }
-        let mut direction = a;
-        for (to, from) in direction.iter_mut().zip(ray.direction) {
-            *to = _mm256_cvtps_pd(_mm_set1_ps(from));
-        }
-        let dot = |p: [__m256d; 3]| {
-            let (x, y) = (
-                _mm256_mul_pd(normal[0], p[0]),
-                _mm256_mul_pd(normal[1], p[1]),
-            );
-            _mm256_add_pd(_mm256_add_pd(x, y), _mm256_mul_pd(normal[2], p[2]))
+        let field = |offset: usize| _mm_loadu_ps((&raw const *ray).cast::<f32>().byte_add(offset));
+        let corner = |c: usize| {
+            let [x, y, z] = [0, 1, 2].map(|axis| *block.corners[axis][c].get_unchecked(lane));
+            _mm_setr_ps(x, y, z, 0.0)
         };
-        let t = _mm256_cvtpd_ps(_mm256_div_pd(dot(a), dot(direction)));
+        let [p, q, r] = [corner(0), corner(1), corner(2)];
+        // In double precision: Shear::distance.
+        let from = _mm256_cvtps_pd(p);
+        let a = _mm256_sub_pd(from, _mm256_cvtps_pd(field(offset_of!(State, origin))));
+        let ab = _mm256_sub_pd(_mm256_cvtps_pd(q), from);
+        let ac = _mm256_sub_pd(_mm256_cvtps_pd(r), from);
+        let turned = |v: __m256d| _mm256_permute4x64_pd::<0b11_00_10_01>(v);
+        let (one, other) = (_mm256_mul_pd(ab, turned(ac)), _mm256_mul_pd(turned(ab), ac));
+        let normal = turned(_mm256_sub_pd(one, other));
+        let direction = _mm256_cvtps_pd(field(offset_of!(State, direction)));
+        let (above, along) = (_mm256_mul_pd(normal, a), _mm256_mul_pd(normal, direction));
+        let xy = _mm_hadd_pd(_mm256_castpd256_pd128(above), _mm256_castpd256_pd128(along));
+        let z = _mm_unpacklo_pd(
+            _mm256_extractf128_pd::<1>(above),
+            _mm256_extractf128_pd::<1>(along),
+        );
+        let dots = _mm_add_pd(xy, z);
+        let t = _mm_cvtsd_f64(_mm_div_sd(dots, _mm_unpackhi_pd(dots, dots))) as f32;
         // Where the ray enters the triangle's box: RayBoxes::entry.
-        let zero = _mm_setzero_ps();
-        let mut near = zero;
-        let mut far = _mm_set1_ps(f32::INFINITY);
-        for axis in 0..3 {
-            let (p, q, r) = (corner(axis, 0), corner(axis, 1), corner(axis, 2));
-            let (low, high) = (
-                _mm_min_ps(p, _mm_min_ps(q, r)),
-                _mm_max_ps(p, _mm_max_ps(q, r)),
-            );
-            let inverse = _mm_set1_ps(ray.inverse[axis]);
-            // A selection by the sign.
-            let first = _mm_blendv_ps(low, high, inverse);
-            let last = _mm_blendv_ps(high, low, inverse);
-            let enter = _mm_fmadd_ps(first, inverse, _mm_set1_ps(ray.entering[axis]));
-            let leave = _mm_fmadd_ps(last, inverse, _mm_set1_ps(ray.leaving[axis]));
-            near = _mm_max_ps(near, enter);
-            far = _mm_min_ps(far, leave);
-        }
-        let passes = _mm_cmple_ps(near, _mm_mul_ps(far, _mm_set1_ps(WIDEN)));
-        let passes = _mm_and_ps(passes, _mm_cmpgt_ps(t, zero));
-        let lanes = _mm_movemask_ps(passes) as u32 & u32::from(ray.lanes);
-        let t = _mm_max_ps(_mm_max_ps(t, near), _mm_set1_ps(ray.entry));
-        // The least of the lanes that count; the first of equal ones has the smallest number.
-        let bits = _mm_setr_epi32(1, 2, 4, 8);
-        let counted = _mm_cmpeq_epi32(_mm_and_si128(_mm_set1_epi32(lanes as i32), bits), bits);
-        let t = _mm_blendv_ps(_mm_set1_ps(f32::INFINITY), t, _mm_castsi128_ps(counted));
-        let least = _mm_min_ps(t, _mm_shuffle_ps::<0b10_11_00_01>(t, t));
-        let least = _mm_min_ps(least, _mm_shuffle_ps::<0b01_00_11_10>(least, least));
-        let first = (_mm_movemask_ps(_mm_cmpeq_ps(t, least)) as u32 & lanes).trailing_zeros();
-        let t = select_unpredictable(lanes == 0, f32::NAN, _mm_cvtss_f32(least));
-        (t, first as usize & (BLOCK - 1))
+        let (low, high) = (
+            _mm_min_ps(p, _mm_min_ps(q, r)),
+            _mm_max_ps(p, _mm_max_ps(q, r)),
+        );
+        let inverse = field(offset_of!(State, inverse));
+        // A selection by the sign.
+        let first = _mm_blendv_ps(low, high, inverse);
+        let last = _mm_blendv_ps(high, low, inverse);
+        let enter = _mm_fmadd_ps(first, inverse, field(offset_of!(State, entering)));
+        let leave = _mm_fmadd_ps(last, inverse, field(offset_of!(State, leaving)));
+        let y = |v: __m128| _mm_movehdup_ps(v);
+        let z = |v: __m128| _mm_movehl_ps(v, v);
+        let near = _mm_max_ss(_mm_max_ss(enter, y(enter)), z(enter));
+        let near = _mm_max_ss(near, _mm_setzero_ps());
+        let far = _mm_min_ss(_mm_min_ss(leave, y(leave)), z(leave));
+        let (near, far) = (_mm_cvtss_f32(near), _mm_cvtss_f32(far) * WIDEN);
+        let passes = (near <= far) & (t > 0.0);
+        let t = greatest(greatest(t, near), ray.entry);
+        select_unpredictable(passes, t, f32::NAN)
     }
 }

@@ -10,12 +10,19 @@ use super::avx;
 use super::kernel::{Ends, FILED, Lanes};
 use super::node::{Block, Entry, Node, OTHER};
 use super::state::State;
+use crate::interaction::Ray;
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Avx512;
 
 // SAFETY: the functions are expanded where AVX-512 F, VL, BW and DQ, AVX2 and FMA may be used.
 unsafe impl Lanes for Avx512 {
+    #[inline(always)]
+    unsafe fn aim(ray: &Ray, state: &mut State) -> bool {
+        // SAFETY: the caller has AVX2 and FMA.
+        unsafe { avx::aim(ray, state) }
+    }
+
     #[inline(always)]
     unsafe fn enter(node: &Node, ray: &State, stack: *mut Entry) -> u32 {
         // SAFETY: the caller has the instructions and room for eight entries; an octant has three bits.

@@ -142,7 +142,8 @@ impl Stacks {
         while ray.current >= OTHER && ray.current != DONE {
             if ray.current == LEAVE {
                 found::<W, ANY>(walker, ray);
-                ray.enter(tree, &walker.start(ray.ray as usize));
+                // SAFETY: the caller has what `L` needs.
+                unsafe { ray.enter::<L>(tree, &walker.start(ray.ray as usize)) };
             } else {
                 // SAFETY: what the ray is at was taken from its top.
                 let entry = unsafe { *self.start.add(ray.top as usize) };
@@ -160,10 +161,12 @@ impl Stacks {
                     Met::Instance(inner, start) => {
                         assert!(inner.levels <= self.inner_levels, "room for the tree");
                         found::<W, ANY>(walker, ray);
-                        // SAFETY: there is room.
-                        unsafe { *self.start.add(ray.top as usize) = EXIT };
+                        // SAFETY: there is room, and the caller has what `L` needs.
+                        unsafe {
+                            *self.start.add(ray.top as usize) = EXIT;
+                            ray.enter::<L>(inner, &start);
+                        }
                         ray.top += 1;
-                        ray.enter(inner, &start);
                         return;
                     }
                 }
@@ -240,7 +243,8 @@ pub(super) unsafe fn batch<'t, L: Lanes, W: Walker<'t>, const ANY: bool, const F
     let bottoms: [u32; IN_FLIGHT] = std::array::from_fn(|slot| flight.bottom(slot));
     let states = flight.states.as_mut_ptr();
     for (slot, state) in flight.states.iter_mut().enumerate().take(slots) {
-        state.begin(slot as u32, tree, &walker.start(slot), bottoms[slot]);
+        // SAFETY: the caller has what `L` needs.
+        unsafe { state.begin::<L>(slot as u32, tree, &walker.start(slot), bottoms[slot]) };
         lists.nodes[0][slot] = slot as u32;
     }
     let (mut next, mut node_count, mut leaf_count) = (slots, slots, 0);
@@ -312,7 +316,7 @@ pub(super) unsafe fn batch<'t, L: Lanes, W: Walker<'t>, const ANY: bool, const F
                         continue;
                     }
                     let bottom = bottoms[slot as usize];
-                    ray.begin(next as u32, tree, &walker.start(next), bottom);
+                    ray.begin::<L>(next as u32, tree, &walker.start(next), bottom);
                     next += 1;
                 }
                 *rest.add(ready) = slot;

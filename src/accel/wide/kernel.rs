@@ -4,6 +4,7 @@
 
 use super::node::{Block, Entry, LEAF, Node, OTHER};
 use super::state::State;
+use crate::interaction::Ray;
 
 /// The steps of a walk that are done on lanes.
 ///
@@ -11,6 +12,15 @@ use super::state::State;
 /// An implementation may need instructions that not every processor has: its functions must be called, or
 /// rather expanded, only where those may be used.
 pub(super) unsafe trait Lanes: Copy {
+    /// Prepares what follows from the ray's origin and direction; whether they are finite.
+    ///
+    /// # Safety
+    /// See the trait.
+    #[inline(always)]
+    unsafe fn aim(ray: &Ray, state: &mut State) -> bool {
+        state.aim(ray)
+    }
+
     /// Writes the children that the ray enters, farthest first, and returns how many.
     ///
     /// # Safety

@@ -1,12 +1,15 @@
 //! A ray on its way through a wide tree, prepared as the kernels want it, and the memory in which dozens
 //! of rays have their stacks.
 
+#![allow(unsafe_code)]
+
 use std::hint::select_unpredictable;
 use std::ptr::null;
 
 use glam::Vec3;
 
 use super::Tree;
+use super::kernel::Lanes;
 use super::node::{BOTTOM, Block, DONE, Entry, Node, WIDTH, entry};
 use crate::accel::boxes::RayBoxes;
 use crate::accel::triangle::Shear;
@@ -114,10 +117,10 @@ pub(super) struct State {
 
 /// A node's slabs of one axis, and a block's corners of one axis, in bytes.
 const NODE_AXIS: u8 = 64;
-const BLOCK_AXIS: u8 = 48;
+pub(super) const BLOCK_AXIS: u8 = 48;
 
 /// [`State::near`] by octant.
-const NEAR: [[u8; 3]; 8] = {
+pub(super) const NEAR: [[u8; 3]; 8] = {
     let mut near = [[0; 3]; 8];
     let mut i = 0;
     while i < 24 {
@@ -154,22 +157,48 @@ impl State {
     };
 
     /// Begins with a ray at a tree's root; `bottom` is its stack's.
+    ///
+    /// # Safety
+    /// The processor has what `L` needs.
     #[inline(always)]
-    pub(super) fn begin(&mut self, ray: u32, tree: &Tree, start: &Start, bottom: u32) {
-        self.enter(tree, start);
+    pub(super) unsafe fn begin<L: Lanes>(
+        &mut self,
+        ray: u32,
+        tree: &Tree,
+        start: &Start,
+        bottom: u32,
+    ) {
+        // SAFETY: the caller's word.
+        unsafe { self.enter::<L>(tree, start) };
         self.top = bottom + SENTINELS as u32;
         self.ray = ray;
     }
 
     /// Puts the ray at the root of a tree; its stack stays.
+    ///
+    /// # Safety
+    /// The processor has what `L` needs.
     #[inline(always)]
-    pub(super) fn enter(&mut self, tree: &Tree, start: &Start) {
-        let (boxes, shear) = (RayBoxes::new(&start.ray), Shear::new(&start.ray));
-        let origin = start.ray.origin.to_array();
-        // A ray that is not finite meets nothing, and its comparisons would go any way.
-        let nought = 0.0 * start.ray.origin + 0.0 * start.ray.direction;
-        let sound = nought.x + nought.y + nought.z == 0.0;
+    pub(super) unsafe fn enter<L: Lanes>(&mut self, tree: &Tree, start: &Start) {
         // Field by field: a whole state would be made elsewhere and copied, which took most of the time.
+        // SAFETY: the caller's word.
+        let sound = unsafe { L::aim(&start.ray, self) };
+        // A ray that is not finite meets nothing, and its comparisons would go any way.
+        self.reach(select_unpredictable(sound, start.best.t, f32::NEG_INFINITY));
+        self.nodes = tree.nodes.as_ptr();
+        self.blocks = tree.blocks.as_ptr();
+        self.current = 0;
+        self.place = start.best.place.0;
+        self.id = start.best.id;
+        self.entry = start.entry;
+        self.instance = start.instance;
+    }
+
+    /// Prepares what follows from the ray's origin and direction; whether they are finite.
+    #[inline(always)]
+    pub(super) fn aim(&mut self, ray: &Ray) -> bool {
+        let (boxes, shear) = (RayBoxes::new(ray), Shear::new(ray));
+        let origin = ray.origin.to_array();
         self.inverse = boxes.inverse.to_array();
         self.entering = boxes.entering.to_array();
         self.leaving = boxes.leaving.to_array();
@@ -180,17 +209,10 @@ impl State {
             self.sheared_origin[axis] = origin[shear.axes[axis]];
             self.axes[axis] = shear.axes[axis] as u8 * BLOCK_AXIS;
         }
-        self.reach(select_unpredictable(sound, start.best.t, f32::NEG_INFINITY));
-        self.nodes = tree.nodes.as_ptr();
-        self.blocks = tree.blocks.as_ptr();
-        self.current = 0;
-        self.place = start.best.place.0;
-        self.id = start.best.id;
         self.origin = origin;
-        self.direction = start.ray.direction.to_array();
+        self.direction = ray.direction.to_array();
         self.shear = shear.shear;
-        self.entry = start.entry;
-        self.instance = start.instance;
+        ray.origin.is_finite() && ray.direction.is_finite()
     }
 
     /// The distance beyond which nothing counts.

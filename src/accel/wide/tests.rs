@@ -24,7 +24,7 @@ fn point(seed: u64, i: u32) -> Vec3 {
     )
 }
 
-fn ray(i: u32) -> State {
+fn ray<L: Lanes>(i: u32) -> State {
     let mut direction = point(2, i);
     if i.is_multiple_of(5) {
         direction[i as usize / 5 % 3] = if i.is_multiple_of(2) { 0.0 } else { -0.0 };
@@ -45,7 +45,8 @@ fn ray(i: u32) -> State {
         },
     };
     let mut state = State::IDLE;
-    state.begin(0, &Tree::default(), &start, 0);
+    // SAFETY: the caller has what the kernel needs.
+    unsafe { state.begin::<L>(0, &Tree::default(), &start, 0) };
     state.lanes = random::bits(5, i) as u8 & 15;
     state
 }
@@ -76,7 +77,7 @@ fn block(i: u32) -> Block {
 fn answers<L: Lanes>() -> Vec<u32> {
     let mut said = Vec::new();
     for i in 0..5000 {
-        let (ray, node, block) = (ray(i), node(i), block(i));
+        let (ray, node, block) = (ray::<L>(i), node(i), block(i));
         let mut stack: [Entry; WIDTH] = [0; WIDTH];
         let distance = |k: u32| 1.0 + number(9, 8 * i + k);
         let mut entries: [Entry; WIDTH] = std::array::from_fn(|k| entry(distance(k as u32), 0));
