@@ -70,6 +70,16 @@ impl Shapes {
         self.starts[item.shape as usize] + item.index
     }
 
+    /// The primitive with a number, if it is one's.
+    #[inline]
+    pub(super) fn find(&self, number: u32) -> Option<Item> {
+        // The last shape that starts there or before; empty ones before it start there too.
+        let after = self.starts.partition_point(|start| *start <= number);
+        let shape = after.checked_sub(1)?;
+        let index = number - self.starts[shape];
+        (index < self.shapes[shape].primitive_count()).then(|| Item::primitive(shape as u32, index))
+    }
+
     /// The primitive with a number.
     #[inline]
     pub(super) fn numbered(&self, number: u32) -> Item {
@@ -248,6 +258,33 @@ impl Leaves for Members<'_> {
         match self.shapes.get(item.shape) {
             Geometry::Mesh(mesh) => (self.shapes.number(item), mesh.corners(item.index)),
             _ => unreachable!("the tree has asked whether it is a triangle"),
+        }
+    }
+
+    fn has_triangle(&self, number: u32) -> bool {
+        let Some(item) = self.shapes.find(number) else {
+            return false;
+        };
+        let run = (self.runs).binary_search_by_key(&item.shape, |run| run.first.shape);
+        run.is_ok() && matches!(self.shapes.get(item.shape), Geometry::Mesh(_))
+    }
+
+    fn digest(&self, hasher: &mut blake3::Hasher) {
+        let ends = self.runs.iter().skip(1).map(|run| run.start);
+        for (run, end) in self.runs.iter().zip(ends.chain([self.count])) {
+            hasher.update(&(end - run.start).to_le_bytes());
+            let shape = run.first.as_instance().is_none();
+            let shape = shape.then(|| self.shapes.get(run.first.shape));
+            if let Some(Geometry::Mesh(mesh)) = shape {
+                hasher.update(&self.shapes.number(run.first).to_le_bytes());
+                hasher.update(mesh.mesh().triangles_hash().as_bytes());
+                continue;
+            }
+            for Bounds { min, max } in (run.start..end).map(|item| self.bounds(item)) {
+                for c in min.to_array().into_iter().chain(max.to_array()) {
+                    hasher.update(&c.to_le_bytes());
+                }
+            }
         }
     }
 }

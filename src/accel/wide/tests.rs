@@ -179,6 +179,14 @@ impl Leaves for Others {
     fn triangle(&self, _: u32) -> (u32, [Vec3; 3]) {
         unreachable!("there is none")
     }
+
+    fn has_triangle(&self, _: u32) -> bool {
+        false
+    }
+
+    fn digest(&self, _: &mut blake3::Hasher) {
+        unreachable!("it is not kept")
+    }
 }
 
 #[test]
