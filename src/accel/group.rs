@@ -1,6 +1,7 @@
 //! A group of shapes with its tree. What has no finite box stands beside the tree, in a short list that
 //! every ray is held against.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use glam::Vec3;
@@ -68,16 +69,6 @@ impl Shapes {
     #[inline]
     pub(super) fn number(&self, item: Item) -> u32 {
         self.starts[item.shape as usize] + item.index
-    }
-
-    /// The primitive with a number, if it is one's.
-    #[inline]
-    pub(super) fn find(&self, number: u32) -> Option<Item> {
-        // The last shape that starts there or before; empty ones before it start there too.
-        let after = self.starts.partition_point(|start| *start <= number);
-        let shape = after.checked_sub(1)?;
-        let index = number - self.starts[shape];
-        (index < self.shapes[shape].primitive_count()).then(|| Item::primitive(shape as u32, index))
     }
 
     /// The primitive with a number.
@@ -261,12 +252,18 @@ impl Leaves for Members<'_> {
         }
     }
 
-    fn has_triangle(&self, number: u32) -> bool {
-        let Some(item) = self.shapes.find(number) else {
-            return false;
-        };
-        let run = (self.runs).binary_search_by_key(&item.shape, |run| run.first.shape);
-        run.is_ok() && matches!(self.shapes.get(item.shape), Geometry::Mesh(_))
+    fn numbers(&self) -> Vec<Range<u32>> {
+        // A mesh is one run.
+        let shapes = self
+            .runs
+            .iter()
+            .filter(|run| run.first.as_instance().is_none());
+        let meshes = shapes.filter(|run| self.shapes.get(run.first.shape).mesh().is_some());
+        let numbers = meshes.map(|run| {
+            let first = self.shapes.number(run.first);
+            first..first + self.shapes.get(run.first.shape).primitive_count()
+        });
+        numbers.collect()
     }
 
     fn digest(&self, hasher: &mut blake3::Hasher) {

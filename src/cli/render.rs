@@ -119,8 +119,8 @@ pub(super) struct Arguments {
     /// triangles and the rays to be expected. The image is the same
     #[arg(long, value_enum, value_name = "WORK", help_heading = RUN)]
     build: Option<Work>,
-    /// Keep trees in this folder, and read from there what was built before for the same triangles. Each is
-    /// checked; the image is the same
+    /// Keep trees in this folder, 60 to 75 bytes a triangle, and read from there what was built before for the same
+    /// triangles. Each is checked; the image is the same
     #[arg(long, value_name = "DIR", help_heading = RUN)]
     cache: Option<PathBuf>,
 
@@ -170,9 +170,9 @@ enum Accel {
 /// How much work goes into the tree.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum Work {
-    /// The least: rays are slower by a third
+    /// The least: rays are a fifth slower
     Quick,
-    /// Several times as much
+    /// Twice as much
     Fast,
     /// Rays are a few percent faster
     Medium,

@@ -23,7 +23,7 @@ const MAGIC: &[u8; 16] = b"etendue tree 2\n\0";
 /// Bytes before the blocks, which begin where a page does.
 const HEAD: usize = 1 << 16;
 const HASH: usize = blake3::OUT_LEN;
-/// Bytes that are hashed at once.
+/// Bytes that have a checksum.
 const GRAIN: usize = 1 << 20;
 
 /// A tree, and those of its items that are no triangles.
@@ -205,13 +205,14 @@ impl Entry {
         Ok((tree, others))
     }
 
-    /// The hash of a file's contents, which belong to this key.
+    /// The hash of a file's contents, which belong to this key: of checksums, which are several times as fast and miss
+    /// no damage that is not meant.
     fn hash(&self, content: &[&[u8]]) -> blake3::Hash {
         let mut hasher = blake3::Hasher::new_keyed(self.key.as_bytes());
         for bytes in content {
-            let parts: Vec<blake3::Hash> = bytes.par_chunks(GRAIN).map(blake3::hash).collect();
-            parts.iter().for_each(|part| {
-                hasher.update(part.as_bytes());
+            let sums: Vec<u32> = bytes.par_chunks(GRAIN).map(crc32fast::hash).collect();
+            sums.iter().for_each(|sum| {
+                hasher.update(&sum.to_le_bytes());
             });
         }
         hasher.finalize()

@@ -27,6 +27,7 @@ mod sketch;
 mod sound;
 mod state;
 
+use std::ops::Range;
 use std::path::Path;
 
 use glam::Vec3;
@@ -72,8 +73,8 @@ pub(super) trait Leaves: Sync {
     fn is_triangle(&self, item: u32) -> bool;
     /// A triangle's number in the scene, and its corners.
     fn triangle(&self, item: u32) -> (u32, [Vec3; 3]);
-    /// Whether one of the triangles has this number in the scene.
-    fn has_triangle(&self, number: u32) -> bool;
+    /// The numbers in the scene that triangles have, ascending.
+    fn numbers(&self) -> Vec<Range<u32>>;
     /// Feeds a hash with everything that a tree over the items is made from.
     fn digest(&self, hasher: &mut blake3::Hasher);
 }

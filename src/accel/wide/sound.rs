@@ -62,9 +62,16 @@ pub(super) fn levels(nodes: &[Node], blocks: usize, others: usize) -> Option<usi
 
 /// Whether blocks hold nothing but triangles of these items, and `others` are those that are none.
 pub(super) fn are_of(blocks: &[Block], others: &[u32], leaves: &impl Leaves) -> bool {
+    let numbers = leaves.numbers();
+    let is_triangle = |number: u32| {
+        let range = numbers.partition_point(|range| range.end <= number);
+        numbers
+            .get(range)
+            .is_some_and(|range| range.start <= number)
+    };
     let lane_is_sound = |block: &Block, lane: usize| match block.ids[lane] {
         u32::MAX => (block.corners.as_flattened().iter()).all(|corner| corner[lane].is_nan()),
-        number => leaves.has_triangle(number),
+        number => is_triangle(number),
     };
     let blocks = blocks.par_iter().with_min_len(GRAIN);
     let is_other = |item: &u32| *item < leaves.count() && !leaves.is_triangle(*item);
