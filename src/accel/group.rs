@@ -1,6 +1,7 @@
 //! A group of shapes with its tree. What has no finite box stands beside the tree, in a short list that
 //! every ray is held against.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use glam::Vec3;
@@ -248,6 +249,39 @@ impl Leaves for Members<'_> {
         match self.shapes.get(item.shape) {
             Geometry::Mesh(mesh) => (self.shapes.number(item), mesh.corners(item.index)),
             _ => unreachable!("the tree has asked whether it is a triangle"),
+        }
+    }
+
+    fn numbers(&self) -> Vec<Range<u32>> {
+        // A mesh is one run.
+        let shapes = self
+            .runs
+            .iter()
+            .filter(|run| run.first.as_instance().is_none());
+        let meshes = shapes.filter(|run| self.shapes.get(run.first.shape).mesh().is_some());
+        let numbers = meshes.map(|run| {
+            let first = self.shapes.number(run.first);
+            first..first + self.shapes.get(run.first.shape).primitive_count()
+        });
+        numbers.collect()
+    }
+
+    fn digest(&self, hasher: &mut blake3::Hasher) {
+        let ends = self.runs.iter().skip(1).map(|run| run.start);
+        for (run, end) in self.runs.iter().zip(ends.chain([self.count])) {
+            hasher.update(&(end - run.start).to_le_bytes());
+            let shape = run.first.as_instance().is_none();
+            let shape = shape.then(|| self.shapes.get(run.first.shape));
+            if let Some(Geometry::Mesh(mesh)) = shape {
+                hasher.update(&self.shapes.number(run.first).to_le_bytes());
+                hasher.update(mesh.mesh().triangles_hash().as_bytes());
+                continue;
+            }
+            for Bounds { min, max } in (run.start..end).map(|item| self.bounds(item)) {
+                for c in min.to_array().into_iter().chain(max.to_array()) {
+                    hasher.update(&c.to_le_bytes());
+                }
+            }
         }
     }
 }

@@ -135,6 +135,31 @@ impl Mesh {
         partial.iter().sum()
     }
 
+    /// A hash of the vertices and triangles, and of nothing else, by all threads.
+    pub fn triangles_hash(&self) -> blake3::Hash {
+        let positions = self.positions.par_chunks(GRAIN).map(|positions| {
+            let mut bytes = vec![[0; 4]; 3 * positions.len()];
+            for (bytes, position) in bytes.as_chunks_mut().0.iter_mut().zip(positions) {
+                *bytes = position.to_array().map(f32::to_le_bytes);
+            }
+            blake3::hash(bytes.as_flattened())
+        });
+        let triangles = self.triangles.par_chunks(GRAIN).map(|triangles| {
+            let mut bytes = vec![[0; 4]; 3 * triangles.len()];
+            for (bytes, triangle) in bytes.as_chunks_mut().0.iter_mut().zip(triangles) {
+                *bytes = triangle.map(u32::to_le_bytes);
+            }
+            blake3::hash(bytes.as_flattened())
+        });
+        let parts: Vec<blake3::Hash> = positions.chain(triangles).collect();
+        let mut hasher = blake3::Hasher::new();
+        hasher.update(&(self.positions.len() as u64).to_le_bytes());
+        parts.iter().for_each(|part| {
+            hasher.update(part.as_bytes());
+        });
+        hasher.finalize()
+    }
+
     /// Moves the vertices by the affine `matrix`, computed in f64, and turns the normals by its inverse
     /// transpose. The winding stays, also under a mirroring matrix: see the module's introduction.
     pub fn transform(&mut self, matrix: &DMat4) {

@@ -297,8 +297,19 @@ pub(super) fn splat(
             let index = (py - window.y) as usize * window.width as usize + (px - window.x) as usize;
             let pixel = &mut data[index * stride..(index + 1) * stride];
             pixel[0] += w;
-            for (sum, value) in pixel[1..].iter_mut().zip(values) {
-                *sum += w * f64::from(*value);
+            // Most films have four channels, and a loop whose length is known costs half.
+            match (&mut pixel[1..], values) {
+                ([r, g, b, a], [to_r, to_g, to_b, to_a]) => {
+                    *r += w * f64::from(*to_r);
+                    *g += w * f64::from(*to_g);
+                    *b += w * f64::from(*to_b);
+                    *a += w * f64::from(*to_a);
+                }
+                (sums, values) => {
+                    for (sum, value) in sums.iter_mut().zip(values) {
+                        *sum += w * f64::from(*value);
+                    }
+                }
             }
         }
     }

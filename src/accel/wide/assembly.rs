@@ -88,10 +88,10 @@ impl Sketches {
     pub(super) fn tree(&self, leaves: &impl Leaves) -> (Tree, Vec<u32>) {
         let counts = (self.parts.par_iter()).map(|sketch| Count::of(sketch, leaves));
         let counts: Vec<Count> = counts.collect();
-        // The root comes first, what is left of the top last.
+        // The top comes first: every node stands before those below it.
         let top_nodes = self.top.as_ref().map_or(0, Sketch::node_count);
         let mut total = Count {
-            nodes: usize::from(top_nodes > 0),
+            nodes: top_nodes,
             ..Count::default()
         };
         let befores = counts.iter().map(|count| {
@@ -100,8 +100,6 @@ impl Sketches {
             before
         });
         let befores: Vec<Count> = befores.collect();
-        let tail = total.nodes;
-        total.nodes += top_nodes.saturating_sub(1);
         assert!(
             total.nodes < LEAF as usize,
             "a tree of fewer than 2³¹ nodes"
@@ -114,9 +112,10 @@ impl Sketches {
             total.others < OTHER_INDEX as usize,
             "fewer than 2³⁰ other items"
         );
-        let mut nodes = Huge::filled(total.nodes, Node::EMPTY);
-        let mut blocks = Huge::filled(total.blocks, Block::EMPTY);
-        let mut rest = (&mut nodes[usize::from(top_nodes > 0)..], &mut blocks[..]);
+        let mut nodes: Huge<Node> = Huge::zeroed(total.nodes);
+        let mut blocks: Huge<Block> = Huge::zeroed(total.blocks);
+        let (top_room, below) = nodes.split_at_mut(top_nodes);
+        let mut rest = (below, &mut blocks[..]);
         let places = befores.into_iter().zip(counts).map(|(before, count)| {
             let (nodes, blocks) = std::mem::take(&mut rest);
             let (nodes, other_nodes) = nodes.split_at_mut(count.nodes);
@@ -135,11 +134,8 @@ impl Sketches {
         let (heads, others) = (heads.concat(), others.concat());
         let mut levels = heads[0].levels;
         if let Some(top) = &self.top {
-            let mut made = vec![Node::EMPTY; top_nodes];
-            let root = top.fill(&mut made, tail as u32 - 1, |items| heads[items[0] as usize]);
+            let root = top.fill(top_room, 0, |items| heads[items[0] as usize]);
             levels = root[0].levels;
-            nodes[0] = made[0];
-            nodes[tail..].copy_from_slice(&made[1..]);
         }
         let tree = Tree {
             nodes,

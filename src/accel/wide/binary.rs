@@ -139,7 +139,7 @@ fn clustered(boxes: &[Bounds], runs: &mut Runs, work: Build, builder: &mut PlocB
     let aabbs: Vec<Aabb> = aabbs.collect();
     // As obvhs's own presets of these names, but for those of its steps that make leaves.
     let (distance, precision, first_levels, share) = match work {
-        Build::Fast => (PlocSearchDistance::Low, SortPrecision::U64, 2, 0.02),
+        Build::Quick | Build::Fast => (PlocSearchDistance::Low, SortPrecision::U64, 2, 0.02),
         Build::Medium => (PlocSearchDistance::Medium, SortPrecision::U64, 3, 0.05),
         Build::Slow => (PlocSearchDistance::High, SortPrecision::U128, 2, 0.2),
     };

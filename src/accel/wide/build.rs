@@ -1,4 +1,4 @@
-//! Building a tree: the items are cut into chunks, and each chunk is clustered and planned by itself, on one thread
+//! Building a tree: the items are cut into chunks, and each chunk is clustered, or sorted, and planned by itself, on one thread
 //! and in little memory. What is kept of it is 16 bytes an item and its [crown](super::crown); once the crowns have been
 //! joined it is known as how many children each of their subtrees is wanted, and the sketches are drawn. Nothing of
 //! this depends on the number of threads.
@@ -13,6 +13,7 @@ use super::binary::binary;
 use super::chunks::{Chunks, chunks, most};
 use super::collapse::{Collapse, Plan};
 use super::crown::{Crown, Top, top};
+use super::curve::{self, Curved, curved};
 use crate::accel::Build;
 use crate::shape::Bounds;
 
@@ -33,9 +34,19 @@ pub(super) fn build_in(
     let planned = items
         .into_par_iter()
         .map_init(PlocBuilder::new, |ploc, items| {
-            let nodes = binary(boxes, &items, work, ploc);
-            let item = |node: &Bvh2Node| Plan::item(node, !leaves.is_triangle(node.first_index));
-            let (collapse, plans) = Collapse::new(&nodes, item);
+            let Curved { nodes, runs } = match work {
+                Build::Quick if items.len() <= curve::MOST => {
+                    curved(boxes, &items, |item| leaves.is_triangle(item))
+                }
+                _ => Curved {
+                    nodes: binary(boxes, &items, work, ploc),
+                    runs: Vec::new(),
+                },
+            };
+            let alone =
+                |leaf: &Bvh2Node| leaf.prim_count == 1 && !leaves.is_triangle(leaf.first_index);
+            let (collapse, plans) =
+                Collapse::new(&nodes, runs, |leaf| Plan::leaf(leaf, alone(leaf)));
             (collapse, several.then(|| Crown::new(&nodes, &plans)))
         });
     let (collapses, crowns): (Vec<Collapse>, Vec<Option<Crown>>) = planned.unzip();

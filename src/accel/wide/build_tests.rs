@@ -32,6 +32,14 @@ impl Leaves for Triangles {
         let corners = self.0.triangles[item as usize];
         (item, corners.map(|c| self.0.positions[c as usize]))
     }
+
+    fn numbers(&self) -> Vec<Range<u32>> {
+        std::iter::once(0..self.count()).collect()
+    }
+
+    fn digest(&self, hasher: &mut blake3::Hasher) {
+        hasher.update(self.0.triangles_hash().as_bytes());
+    }
 }
 
 /// What a ray costs on average: nodes by the share of their area in the root's, and blocks at 0.8.

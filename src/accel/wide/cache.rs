@@ -1,46 +1,47 @@
-//! Trees on disk. A file holds the [sketches](super::sketch) of a tree, about 6 bytes an item, and is named
-//! after a hash of what the tree was made from: the items' boxes and what went into it. Nodes and blocks are made
-//! anew from the items, so that a tree from a file is the tree that was written, to the bit.
+//! Trees on disk. A file holds the nodes and blocks of a tree as they are in memory, about 60 bytes a triangle, and is
+//! named after a hash of what the tree was made from: so that reading it is all that there is to do.
 //!
-//! Nothing in a file is believed. Its length and its hash are held against it first, for files get damaged;
-//! and then whether it is a tree over these items, each of them in one leaf, for anybody may have written it.
-//! So a false file can make rays slower, and never change a hit.
+//! Its length and its hash are held against a file first, for files get damaged. The hash is of this version's and
+//! belongs to the items; who can forge it can also forge an image. But what is in a file is then shown to be
+//! [a tree](super::sound), and nodes are looked at only after they have been copied: whatever a file holds, and whoever
+//! writes to it meanwhile, no walk leaves the tree and none is without end.
 
 use std::fs::{self, File};
-use std::io::{self, Read, Write};
+use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
-use super::Leaves;
-use super::assembly::Sketches;
-use super::binary::DEEPEST;
-use super::build::build;
-use super::node::WIDTH;
-use super::sketch::{INNER, Sketch, Stroke};
+use super::huge::{Huge, read_at};
+use super::node::{BLOCK_INDEX, Block, LEAF, Node};
+use super::{Leaves, Tree, sound};
 use crate::accel::{Build, CacheUse};
 use crate::error::Error;
-use crate::shape::Bounds;
 
 /// What every file begins with. The number changes with what is in the file, and whenever trees are built otherwise.
-const MAGIC: &[u8; 16] = b"etendue tree 1\n\0";
+const MAGIC: &[u8; 16] = b"etendue tree 2\n\0";
+/// Bytes before the blocks, which begin where a page does.
+const HEAD: usize = 1 << 16;
 const HASH: usize = blake3::OUT_LEN;
-/// Items that are hashed at once.
-const GRAIN: usize = 1 << 15;
+/// Bytes that have a checksum.
+const GRAIN: usize = 1 << 20;
+
+/// A tree, and those of its items that are no triangles.
+pub(super) type Whole = (Tree, Vec<u32>);
 
 /// The tree from the folder, or else built and laid down there. What goes wrong with files is told, and does no harm.
 pub(super) fn through(
     folder: &Path,
-    boxes: &[Bounds],
     leaves: &impl Leaves,
     work: Build,
-) -> (Sketches, CacheUse) {
-    let entry = Entry::new(folder, boxes, leaves, work);
+    build: impl FnOnce() -> Whole,
+) -> (Whole, CacheUse) {
+    let entry = Entry::new(folder, leaves, work);
     let mut used = CacheUse::default();
     match entry.read(leaves) {
-        Ok(sketches) => {
+        Ok(whole) => {
             used.read = 1;
-            return (sketches, used);
+            return (whole, used);
         }
         Err(Missing::New) => {}
         Err(Missing::Bad(path, what)) => {
@@ -48,12 +49,12 @@ pub(super) fn through(
             used.warn(Error::input(message));
         }
     }
-    let sketches = build(boxes, leaves, work);
-    match entry.write(&sketches) {
+    let whole = build();
+    match entry.write(&whole) {
         Ok(()) => used.written = 1,
         Err((path, error)) => used.warn(Error::system("write", &path, &error)),
     }
-    (sketches, used)
+    (whole, used)
 }
 
 /// A tree's place on disk.
@@ -73,25 +74,61 @@ pub(super) enum Missing {
     Bad(PathBuf, String),
 }
 
+/// How much there is of everything in a file.
+#[derive(Clone, Copy, Debug)]
+struct Counts {
+    blocks: usize,
+    nodes: usize,
+    others: usize,
+}
+
+impl Counts {
+    fn of((tree, others): &Whole) -> Self {
+        Self {
+            blocks: tree.blocks.len(),
+            nodes: tree.nodes.len(),
+            others: others.len(),
+        }
+    }
+
+    /// The head of a file. All numbers are in this machine's order of bytes, and the first of them tells it.
+    fn head(self) -> Vec<u8> {
+        let mut head = MAGIC.to_vec();
+        for count in [1, self.blocks, self.nodes, self.others] {
+            head.extend((count as u64).to_ne_bytes());
+        }
+        head.resize(HEAD, 0);
+        head
+    }
+
+    /// What a head says, if it is one.
+    fn from_head(head: &[u8]) -> Option<Self> {
+        let (numbers, _) = head.strip_prefix(MAGIC)?.as_chunks();
+        let number = |i: usize| numbers.get(i).map(|bytes| u64::from_ne_bytes(*bytes));
+        let below = |i: usize, most: u32| number(i).filter(|n| *n < u64::from(most));
+        Some(Self {
+            blocks: below(1, BLOCK_INDEX)? as usize,
+            nodes: below(2, LEAF)? as usize,
+            others: below(3, LEAF)? as usize,
+        })
+        .filter(|_| number(0) == Some(1))
+    }
+
+    /// Where nodes, the others and the hash begin.
+    fn places(self) -> [u64; 3] {
+        let blocks = (self.blocks * size_of::<Block>()) as u64;
+        let nodes = (self.nodes * size_of::<Node>()) as u64;
+        let first = HEAD as u64 + blocks;
+        [first, first + nodes, first + nodes + 4 * self.others as u64]
+    }
+}
+
 impl Entry {
-    /// The place of the tree over items in these boxes.
-    pub(super) fn new(folder: &Path, boxes: &[Bounds], leaves: &impl Leaves, work: Build) -> Self {
-        let blocks = boxes.par_chunks(GRAIN).enumerate().map(|(block, boxes)| {
-            let mut bytes = Vec::with_capacity(25 * boxes.len());
-            for (item, Bounds { min, max }) in (block * GRAIN..).zip(boxes) {
-                for c in min.to_array().into_iter().chain(max.to_array()) {
-                    bytes.extend(c.to_le_bytes());
-                }
-                bytes.push(leaves.is_triangle(item as u32).into());
-            }
-            blake3::hash(&bytes)
-        });
+    /// The place of the tree over some items.
+    pub(super) fn new(folder: &Path, leaves: &impl Leaves, work: Build) -> Self {
         let mut hasher = blake3::Hasher::new();
         hasher.update(MAGIC);
-        let blocks: Vec<blake3::Hash> = blocks.collect();
-        blocks.iter().for_each(|hash| {
-            hasher.update(hash.as_bytes());
-        });
+        leaves.digest(&mut hasher);
         Self {
             key: hasher.finalize(),
             folder: folder.to_owned(),
@@ -101,6 +138,7 @@ impl Entry {
 
     fn path(&self, work: Build) -> PathBuf {
         let name = match work {
+            Build::Quick => "quick",
             Build::Fast => "fast",
             Build::Medium => "medium",
             Build::Slow => "slow",
@@ -110,17 +148,20 @@ impl Entry {
     }
 
     /// The tree with this work in it, or more.
-    pub(super) fn read(&self, leaves: &impl Leaves) -> Result<Sketches, Missing> {
-        let works = [Build::Slow, Build::Medium, Build::Fast];
+    pub(super) fn read(&self, leaves: &impl Leaves) -> Result<Whole, Missing> {
+        let works = [Build::Slow, Build::Medium, Build::Fast, Build::Quick];
         let mut missing = Missing::New;
         for work in works.into_iter().take_while(|work| *work >= self.work) {
             let path = self.path(work);
-            let bad = match read(&path) {
-                Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
+            let bad = match File::open(&path) {
+                Err(error) if error.kind() == ErrorKind::NotFound => continue,
                 Err(error) => error.to_string(),
-                Ok(bytes) => match self.sketches(&bytes, leaves) {
-                    Ok(sketches) => return Ok(sketches),
-                    Err(what) => what.to_owned(),
+                Ok(file) => match self.whole(&file, leaves) {
+                    Ok(whole) => return Ok(whole),
+                    Err(error) if error.kind() == ErrorKind::UnexpectedEof => {
+                        "it is cut off".to_owned()
+                    }
+                    Err(error) => error.to_string(),
                 },
             };
             missing = Missing::Bad(path, bad);
@@ -128,185 +169,70 @@ impl Entry {
         Err(missing)
     }
 
-    fn sketches(&self, bytes: &[u8], leaves: &impl Leaves) -> Result<Sketches, &'static str> {
-        let (content, hash) = bytes.split_last_chunk::<HASH>().ok_or("it is cut off")?;
-        let content = content
-            .strip_prefix(MAGIC)
-            .ok_or("it is no tree of this version")?;
-        if blake3::Hash::from_bytes(*hash) != self.hash(content) {
-            return Err("its contents are damaged");
+    fn whole(&self, file: &File, leaves: &impl Leaves) -> io::Result<Whole> {
+        let mut head = vec![0; HEAD];
+        read_at(file, 0, &mut head)?;
+        let version = || io::Error::other("it is no tree of this version");
+        let counts = Counts::from_head(&head).ok_or_else(version)?;
+        let [nodes_at, others_at, hash_at] = counts.places();
+        if file.metadata()?.len() != hash_at + HASH as u64 {
+            return Err(io::Error::other("its length is wrong"));
         }
-        let sketches = Reader(content)
-            .sketches()
-            .ok_or("its contents are not a tree")?;
-        let is_sound = is_sound(&sketches, leaves);
-        is_sound
-            .then_some(sketches)
-            .ok_or("it is a tree of other items")
+        let nodes: Huge<Node> = Huge::read(file, nodes_at, counts.nodes)?;
+        // Few rays come to few blocks; many want them in huge pages.
+        let blocks: Huge<Block> = match self.work {
+            Build::Quick => Huge::mapped(file, HEAD as u64, counts.blocks)?,
+            _ => Huge::read(file, HEAD as u64, counts.blocks)?,
+        };
+        let mut others = vec![0; 4 * counts.others];
+        read_at(file, others_at, &mut others)?;
+        let mut hash = [0; HASH];
+        read_at(file, hash_at, &mut hash)?;
+        let content = [&head[..], blocks.bytes(), nodes.bytes(), &others];
+        if blake3::Hash::from_bytes(hash) != self.hash(&content) {
+            return Err(io::Error::other("its contents are damaged"));
+        }
+        let (others, _) = others.as_chunks();
+        let others: Vec<u32> = others.iter().map(|o| u32::from_ne_bytes(*o)).collect();
+        let levels = sound::levels(&nodes, blocks.len(), others.len())
+            .filter(|_| sound::are_of(&blocks, &others, leaves))
+            .ok_or_else(|| io::Error::other("its contents are no tree of these items"))?;
+        let tree = Tree {
+            nodes,
+            blocks,
+            levels,
+        };
+        Ok((tree, others))
     }
 
-    /// The hash of a file's contents, which belong to this key.
-    fn hash(&self, content: &[u8]) -> blake3::Hash {
-        let parts: Vec<blake3::Hash> = content.par_chunks(1 << 20).map(blake3::hash).collect();
+    /// The hash of a file's contents, which belong to this key: of checksums, which are several times as fast and miss
+    /// no damage that is not meant.
+    fn hash(&self, content: &[&[u8]]) -> blake3::Hash {
         let mut hasher = blake3::Hasher::new_keyed(self.key.as_bytes());
-        parts.iter().for_each(|part| {
-            hasher.update(part.as_bytes());
-        });
+        for bytes in content {
+            let sums: Vec<u32> = bytes.par_chunks(GRAIN).map(crc32fast::hash).collect();
+            sums.iter().for_each(|sum| {
+                hasher.update(&sum.to_le_bytes());
+            });
+        }
         hasher.finalize()
     }
 
     /// Writes the tree, under another name first: whoever reads finds all of it or nothing.
-    pub(super) fn write(&self, sketches: &Sketches) -> Result<(), (PathBuf, io::Error)> {
+    pub(super) fn write(&self, whole: &Whole) -> Result<(), (PathBuf, io::Error)> {
         let path = self.path(self.work);
-        let content = content(sketches);
+        let head = Counts::of(whole).head();
+        let (tree, others) = whole;
+        let others: Vec<u8> = others.iter().flat_map(|o| o.to_ne_bytes()).collect();
+        let content = [&head[..], tree.blocks.bytes(), tree.nodes.bytes(), &others];
         let write = || -> io::Result<()> {
             fs::create_dir_all(&self.folder)?;
             let mut file = tempfile::NamedTempFile::new_in(&self.folder)?;
-            file.write_all(MAGIC)?;
-            file.write_all(&content)?;
+            content.iter().try_for_each(|bytes| file.write_all(bytes))?;
             file.write_all(self.hash(&content).as_bytes())?;
             file.persist(&path)?;
             Ok(())
         };
         write().map_err(|error| (path, error))
     }
-}
-
-/// What is in a file; room for it is taken as it comes.
-fn read(path: &Path) -> io::Result<Vec<u8>> {
-    let file = File::open(path)?;
-    let length = file.metadata()?.len();
-    let mut bytes = Vec::new();
-    bytes
-        .try_reserve_exact(usize::try_from(length).unwrap_or(usize::MAX))
-        .map_err(|_| io::Error::from(io::ErrorKind::OutOfMemory))?;
-    file.take(length).read_to_end(&mut bytes)?;
-    Ok(bytes)
-}
-
-/// Numbers of 32 bits, the low bytes first: how many parts, each part, and the top, if there are several.
-fn content(sketches: &Sketches) -> Vec<u8> {
-    let all = sketches.parts.iter().chain(&sketches.top);
-    let pieces: Vec<&Sketch> = all.collect();
-    let pieces = pieces.into_par_iter().map(|sketch| {
-        let mut bytes = Vec::with_capacity(16 * sketch.nodes.len() + 4 * sketch.items.len() + 12);
-        let counts = [
-            sketch.heads,
-            sketch.nodes.len() as u32,
-            sketch.items.len() as u32,
-        ];
-        bytes.extend(counts.into_iter().flat_map(u32::to_le_bytes));
-        for stroke in &sketch.nodes {
-            bytes.extend(stroke.children);
-            bytes.extend(stroke.first_node.to_le_bytes());
-            bytes.extend(stroke.first_item.to_le_bytes());
-        }
-        bytes.extend(sketch.items.iter().flat_map(|item| item.to_le_bytes()));
-        bytes
-    });
-    let pieces: Vec<Vec<u8>> = pieces.collect();
-    let mut bytes = (sketches.parts.len() as u32).to_le_bytes().to_vec();
-    bytes.reserve_exact(pieces.iter().map(Vec::len).sum());
-    pieces.iter().for_each(|piece| bytes.extend(piece));
-    bytes
-}
-
-/// What is left to be read.
-struct Reader<'b>(&'b [u8]);
-
-impl<'b> Reader<'b> {
-    fn take(&mut self, bytes: usize) -> Option<&'b [u8]> {
-        let (taken, rest) = self.0.split_at_checked(bytes)?;
-        self.0 = rest;
-        Some(taken)
-    }
-
-    fn number(&mut self) -> Option<u32> {
-        let (number, rest) = self.0.split_first_chunk()?;
-        self.0 = rest;
-        Some(u32::from_le_bytes(*number))
-    }
-
-    /// The sketches, if they are all that there is.
-    fn sketches(mut self) -> Option<Sketches> {
-        let parts = self.number()? as usize;
-        let count = parts + usize::from(parts > 1);
-        // Each takes some bytes.
-        let mut pieces = Vec::with_capacity(count.min(self.0.len()));
-        for _ in 0..count {
-            let [heads, nodes, items] = [self.number()?, self.number()?, self.number()?];
-            let nodes = self.take((nodes as usize).checked_mul(16)?)?;
-            let items = self.take((items as usize).checked_mul(4)?)?;
-            pieces.push((heads, nodes, items));
-        }
-        let sketch = |(heads, nodes, items): (u32, &[u8], &[u8])| {
-            let stroke = |bytes: &[u8; 16]| {
-                let [first_node, first_item] = [WIDTH, WIDTH + 4].map(|at| number(&bytes[at..]));
-                let mut children = [0; WIDTH];
-                children.copy_from_slice(&bytes[..WIDTH]);
-                Stroke {
-                    children,
-                    first_node,
-                    first_item,
-                }
-            };
-            let (nodes, _) = nodes.as_chunks();
-            Sketch {
-                heads,
-                nodes: nodes.iter().map(stroke).collect(),
-                items: items.chunks_exact(4).map(number).collect(),
-            }
-        };
-        let mut parts: Vec<Sketch> = pieces.into_par_iter().map(sketch).collect();
-        let top = (count > 1).then(|| parts.pop()).flatten();
-        self.0.is_empty().then_some(Sketches { parts, top })
-    }
-}
-
-/// The number in the first four bytes.
-fn number(bytes: &[u8]) -> u32 {
-    bytes.first_chunk().copied().map_or(0, u32::from_le_bytes)
-}
-
-/// Whether these make a tree of all items.
-fn is_sound(Sketches { parts, top }: &Sketches, leaves: &impl Leaves) -> bool {
-    // One for what holds the heads.
-    let deepest = DEEPEST as u16 + 1;
-    let sound = |sketch: &Sketch| {
-        let mut fits = (sketch.heads > 0) == top.is_some() && sketch.is_sound(deepest);
-        if fits {
-            // Only triangles share a leaf.
-            sketch.each_leaf(|items| {
-                let alone = |item: &u32| *item < leaves.count() && leaves.is_triangle(*item);
-                fits &= matches!(items, [_]) || items.iter().all(alone);
-            });
-        }
-        fits
-    };
-    let items = parts.iter().flat_map(|sketch| &sketch.items);
-    if parts.is_empty() || !parts.par_iter().all(sound) || !once(items, leaves.count() as usize) {
-        return false;
-    }
-    top.as_ref().is_none_or(|top| {
-        let heads: usize = parts.iter().map(|part| part.heads as usize).sum();
-        let mut children = top.nodes.iter().flat_map(|stroke| stroke.children);
-        top.heads == 0
-            && top.is_sound(deepest)
-            && children.all(|child| matches!(child, 0 | 1 | INNER))
-            && once(top.items.iter(), heads)
-    })
-}
-
-/// Whether these are the numbers below `count`, each once.
-fn once<'a>(items: impl Iterator<Item = &'a u32>, count: usize) -> bool {
-    let mut seen = vec![false; count];
-    let mut total = 0;
-    for item in items {
-        match seen.get_mut(*item as usize) {
-            Some(seen) if !*seen => *seen = true,
-            _ => return false,
-        }
-        total += 1;
-    }
-    total == count
 }

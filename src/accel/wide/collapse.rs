@@ -43,11 +43,11 @@ fn share(first: &Plan, second: &Plan, slots: usize) -> (usize, f32) {
 }
 
 impl Plan {
-    /// The plan for an item.
-    pub(super) fn item(node: &Bvh2Node, alone: bool) -> Self {
+    /// The plan for a leaf's items.
+    pub(super) fn leaf(node: &Bvh2Node, alone: bool) -> Self {
         Self {
             cost: [area(node) * BLOCK_COST; WIDTH - 1],
-            items: 1,
+            items: node.prim_count,
             leaf: true,
             alone,
         }
@@ -105,13 +105,15 @@ struct Choice {
     /// Its children, or its item.
     first: u32,
     /// Three bits each for 2, 3, … 8 children: how many its first child gets; 0 if it is no better with them
-    /// than with one less. Then whether it is an item, and whether it is a leaf.
+    /// than with one less. Then whether it has items and no children, whether it becomes a leaf, and in two bits how
+    /// many items it has beside the first.
     bits: u32,
 }
 
 impl Choice {
     const ITEM: u32 = 1 << 24;
     const LEAF: u32 = 1 << 25;
+    const COUNT_SHIFT: u32 = 26;
 
     fn new(node: &Bvh2Node, plan: &Plan, shares: [usize; WIDTH + 1]) -> Self {
         let mut bits = 0;
@@ -119,7 +121,7 @@ impl Choice {
             bits |= ((share & 7) as u32) << (3 * (slots - 2));
         }
         if node.is_leaf() {
-            bits |= Self::ITEM;
+            bits |= Self::ITEM | (node.prim_count - 1) << Self::COUNT_SHIFT;
         }
         if plan.leaf {
             bits |= Self::LEAF;
@@ -138,6 +140,11 @@ impl Choice {
         self.bits & Self::LEAF != 0
     }
 
+    /// How many items it has, if it is one.
+    fn count(self) -> usize {
+        (self.bits >> Self::COUNT_SHIFT) as usize + 1
+    }
+
     /// How many of so many children the first child gets.
     #[inline]
     fn share(self, slots: usize) -> usize {
@@ -149,11 +156,18 @@ impl Choice {
 #[derive(Debug)]
 pub(super) struct Collapse {
     choices: Vec<Choice>,
+    /// Where leaves of several items have theirs.
+    runs: Vec<u32>,
 }
 
 impl Collapse {
-    /// Plans for a tree with parents before children; leaves are asked for theirs.
-    pub(super) fn new(nodes: &[Bvh2Node], leaf: impl Fn(&Bvh2Node) -> Plan) -> (Self, Vec<Plan>) {
+    /// Plans for a tree with parents before children; leaves are asked for theirs. A leaf of one item names it, a leaf
+    /// of two to four the place of the first among `runs`.
+    pub(super) fn new(
+        nodes: &[Bvh2Node],
+        runs: Vec<u32>,
+        leaf: impl Fn(&Bvh2Node) -> Plan,
+    ) -> (Self, Vec<Plan>) {
         let mut plans = vec![Plan::default(); nodes.len()];
         let nothing = Choice { first: 0, bits: 0 };
         let mut choices = vec![nothing; nodes.len()];
@@ -170,7 +184,7 @@ impl Collapse {
             plans[i] = plan;
             choices[i] = Choice::new(node, &plan, shares);
         }
-        (Self { choices }, plans)
+        (Self { choices, runs }, plans)
     }
 
     /// The binary nodes that stand for `node` as at most so many children, each one of them; items as many as
@@ -295,7 +309,10 @@ impl Collapse {
             height -= 1;
             let choice = self.choices[open[height]];
             if choice.is_item() {
-                items.push(choice.first);
+                match choice.count() {
+                    1 => items.push(choice.first),
+                    count => items.extend(&self.runs[choice.first as usize..][..count]),
+                }
                 continue;
             }
             let child = choice.first as usize;

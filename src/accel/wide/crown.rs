@@ -112,7 +112,7 @@ pub(super) fn top(cuts: Vec<Bvh2Node>, crowns: &[Crown], work: Build) -> Top {
     };
     tree.reorder_in_stack_traversal_order();
     let share = match work {
-        Build::Fast => 0.2,
+        Build::Quick | Build::Fast => 0.2,
         Build::Medium | Build::Slow => 1.0,
     };
     ReinsertionOptimizer::default().run(&mut tree, share, None);
@@ -131,7 +131,7 @@ pub(super) fn top(cuts: Vec<Bvh2Node>, crowns: &[Crown], work: Build) -> Top {
         depth_first(&mut tree);
     }
     let subtree = |node: &Bvh2Node| plans[node.first_index as usize];
-    let (collapse, _) = Collapse::new(&tree.nodes, subtree);
+    let (collapse, _) = Collapse::new(&tree.nodes, Vec::new(), subtree);
     let mut sketch = collapse.sketch();
     // A subtree stands there as often as it is wanted, and becomes so many heads.
     let mut slots = vec![0; plans.len()];

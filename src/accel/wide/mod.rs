@@ -18,13 +18,16 @@ mod chunks;
 mod collapse;
 mod compiled;
 mod crown;
+mod curve;
 mod huge;
 mod kernel;
 mod node;
 mod portable;
 mod sketch;
+mod sound;
 mod state;
 
+use std::ops::Range;
 use std::path::Path;
 
 use glam::Vec3;
@@ -70,6 +73,10 @@ pub(super) trait Leaves: Sync {
     fn is_triangle(&self, item: u32) -> bool;
     /// A triangle's number in the scene, and its corners.
     fn triangle(&self, item: u32) -> (u32, [Vec3; 3]);
+    /// The numbers in the scene that triangles have, ascending.
+    fn numbers(&self) -> Vec<Range<u32>>;
+    /// Feeds a hash with everything that a tree over the items is made from.
+    fn digest(&self, hasher: &mut blake3::Hasher);
 }
 
 /// See the module.
@@ -85,8 +92,8 @@ pub(super) struct Tree {
 impl Default for Tree {
     fn default() -> Self {
         Self {
-            nodes: Huge::filled(1, Node::EMPTY),
-            blocks: Huge::filled(0, Block::EMPTY),
+            nodes: Huge::of(Node::EMPTY),
+            blocks: Huge::zeroed(0),
             levels: 1,
         }
     }
@@ -103,17 +110,18 @@ impl Tree {
         if leaves.count() == 0 {
             return Default::default();
         }
-        let boxes: Vec<Bounds> = (0..leaves.count())
-            .into_par_iter()
-            .map(|item| leaves.bounds(item))
-            .collect();
-        let cache = cache.filter(|_| leaves.count() >= WORTH_KEEPING);
-        let (sketches, used) = match cache {
-            Some(folder) => cache::through(folder, &boxes, leaves, work),
-            None => (build::build(&boxes, leaves, work), CacheUse::default()),
+        let build = || {
+            let bounds = |item| leaves.bounds(item);
+            let boxes: Vec<Bounds> = (0..leaves.count()).into_par_iter().map(bounds).collect();
+            let sketches = build::build(&boxes, leaves, work);
+            drop(boxes); // before the nodes take memory
+            sketches.tree(leaves)
         };
-        drop(boxes); // before the nodes take memory
-        let (tree, others) = sketches.tree(leaves);
+        let cache = cache.filter(|_| leaves.count() >= WORTH_KEEPING);
+        let ((tree, others), used) = match cache {
+            Some(folder) => cache::through(folder, leaves, work, build),
+            None => (build(), CacheUse::default()),
+        };
         (tree, others, used)
     }
 

@@ -1,8 +1,8 @@
 //! The shape of a wide tree without its boxes: which nodes, blocks and items hang below which, in 16 bytes a
-//! node and 4 an item. A sketch comes from a binary tree or from a file, and becomes nodes and blocks by
-//! what its items say of their boxes, from the leaves up.
+//! node and 4 an item. A sketch comes from a binary tree, and becomes nodes and blocks by what its items
+//! say of their boxes, from the leaves up.
 
-use super::node::{BLOCK, DONE, Node, WIDTH};
+use super::node::{DONE, Node, WIDTH};
 use crate::shape::Bounds;
 
 /// A child that is a node; other children are 1 to 4 items.
@@ -17,17 +17,6 @@ pub(super) struct Stroke {
     pub(super) first_node: u32,
     /// The first of the items of its other children.
     pub(super) first_item: u32,
-}
-
-impl Stroke {
-    /// How many children it has, if it can be one.
-    fn count(&self) -> Option<usize> {
-        let count = self.children.iter().take_while(|c| **c > 0).count();
-        let (there, beyond) = self.children.split_at(count);
-        let known = |child: &u8| *child == INNER || usize::from(*child) <= BLOCK;
-        let is_sound = there.iter().all(known) && beyond.iter().all(|child| *child == 0);
-        (is_sound && count > 0).then_some(count)
-    }
 }
 
 /// See the module.
@@ -137,62 +126,5 @@ impl Sketch {
         }
         let heads = children[..holders].iter().flatten();
         heads.filter(|head| head.name != DONE).copied().collect()
-    }
-
-    /// Whether it can be a tree, which may come from anywhere: every node but the first ones hangs below one that stands
-    /// before it, every item in one leaf, and no way down is longer than `deepest`. Whoever asks shows that
-    /// leaves are what they should be.
-    pub(super) fn is_sound(&self, deepest: u16) -> bool {
-        let first = self.holders().max(1);
-        if self.nodes.len() < first {
-            return false;
-        }
-        let mut heads = 0;
-        // Levels above each node; 0 where nobody has named it.
-        let mut levels = vec![0; self.nodes.len()];
-        levels[..first].fill(1_u16);
-        let mut items = 0;
-        for (i, stroke) in self.nodes.iter().enumerate() {
-            let (Some(count), 1..) = (stroke.count(), levels[i]) else {
-                return false;
-            };
-            if i < self.holders() {
-                heads += count;
-            }
-            // Items are written in another order than nodes; each leaf's are looked for in `items_once`.
-            items += (stroke.children.iter())
-                .filter(|c| **c != INNER)
-                .map(|c| usize::from(*c))
-                .sum::<usize>();
-            let inner = stroke.children.iter().filter(|c| **c == INNER).count();
-            let begin = stroke.first_node as usize;
-            let level = levels[i] + 1;
-            let below = (begin > i).then(|| levels.get_mut(begin..begin.saturating_add(inner)));
-            match below.flatten() {
-                _ if inner == 0 => {}
-                Some(below) if level <= deepest && below.iter().all(|level| *level == 0) => {
-                    below.fill(level);
-                }
-                _ => return false,
-            }
-        }
-        heads == self.heads as usize && items == self.items.len() && self.items_once()
-    }
-
-    /// Whether the leaves share the items out.
-    fn items_once(&self) -> bool {
-        let mut taken = vec![false; self.items.len()];
-        self.nodes.iter().all(|stroke| {
-            let leaves = stroke.children.iter().filter(|c| **c != INNER);
-            let count: usize = leaves.map(|c| usize::from(*c)).sum();
-            let begin = stroke.first_item as usize;
-            match taken.get_mut(begin..begin.saturating_add(count)) {
-                Some(these) if !these.contains(&true) => {
-                    these.fill(true);
-                    true
-                }
-                _ => false,
-            }
-        })
     }
 }

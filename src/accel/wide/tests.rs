@@ -180,6 +180,14 @@ impl Leaves for Others {
     fn triangle(&self, _: u32) -> (u32, [Vec3; 3]) {
         unreachable!("there is none")
     }
+
+    fn numbers(&self) -> Vec<Range<u32>> {
+        Vec::new()
+    }
+
+    fn digest(&self, _: &mut blake3::Hasher) {
+        unreachable!("it is not kept")
+    }
 }
 
 #[test]
