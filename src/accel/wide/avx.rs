@@ -57,12 +57,12 @@ static SHEARED: [([u32; 4], [u8; 3]); 6] = {
 };
 
 /// What [`Lanes::aim`] says: [`RayBoxes::new`](crate::accel::boxes::RayBoxes::new) and [`Shear::new`] in lanes.
-/// Fields are written four numbers at a time, each over the end of the one before.
+/// Fields are written four numbers at a time, each over the end of the one before; the last one as it is.
 ///
 /// # Safety
 /// The processor has AVX2 and FMA.
 #[inline(always)]
-pub(super) unsafe fn aim(ray: &Ray, state: &mut State) -> bool {
+pub(super) unsafe fn aim(ray: &Ray, state: &mut State) {
     // SAFETY: the caller has the instructions; the state's layout is C's, where behind each of these fields there
     // is a number more; an index into a table is below its length.
     unsafe {
@@ -102,10 +102,10 @@ pub(super) unsafe fn aim(ray: &Ray, state: &mut State) -> bool {
         store(offset_of!(State, direction), direction);
         let sheared_origin = _mm_permutevar_ps(origin, places);
         store(offset_of!(State, sheared_origin), sheared_origin);
-        store(offset_of!(State, shear), shear);
+        _mm_storel_epi64((&raw mut (*state).shear).cast(), _mm_castps_si128(shear));
         (*state).axes = *axes;
         let nought = _mm_add_ps(_mm_mul_ps(zero, origin), _mm_mul_ps(zero, direction));
-        _mm_movemask_ps(_mm_cmpeq_ps(nought, zero)) & 7 == 7
+        (*state).end_unless(_mm_movemask_ps(_mm_cmpeq_ps(nought, zero)) & 7 == 7);
     }
 }
 
@@ -141,9 +141,9 @@ pub(super) unsafe fn slabs(node: &Node, ray: &State) -> (__m256, __m256) {
 // SAFETY: the functions are expanded where AVX2 and FMA may be used.
 unsafe impl Lanes for Avx2 {
     #[inline(always)]
-    unsafe fn aim(ray: &Ray, state: &mut State) -> bool {
+    unsafe fn aim(ray: &Ray, state: &mut State) {
         // SAFETY: the caller has what is needed.
-        unsafe { aim(ray, state) }
+        unsafe { aim(ray, state) };
     }
 
     #[inline(always)]

@@ -18,9 +18,9 @@ pub(super) struct Avx512;
 // SAFETY: the functions are expanded where AVX-512 F, VL, BW and DQ, AVX2 and FMA may be used.
 unsafe impl Lanes for Avx512 {
     #[inline(always)]
-    unsafe fn aim(ray: &Ray, state: &mut State) -> bool {
+    unsafe fn aim(ray: &Ray, state: &mut State) {
         // SAFETY: the caller has AVX2 and FMA.
-        unsafe { avx::aim(ray, state) }
+        unsafe { avx::aim(ray, state) };
     }
 
     #[inline(always)]

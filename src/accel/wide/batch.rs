@@ -142,8 +142,10 @@ impl Stacks {
         while ray.current >= OTHER && ray.current != DONE {
             if ray.current == LEAVE {
                 found::<W, ANY>(walker, ray);
+                let start = walker.start(ray.ray as usize);
+                ray.enter(tree, &start);
                 // SAFETY: the caller has what `L` needs.
-                unsafe { ray.enter::<L>(tree, &walker.start(ray.ray as usize)) };
+                unsafe { L::aim(&start.ray, ray) };
             } else {
                 // SAFETY: what the ray is at was taken from its top.
                 let entry = unsafe { *self.start.add(ray.top as usize) };
@@ -164,9 +166,10 @@ impl Stacks {
                         // SAFETY: there is room, and the caller has what `L` needs.
                         unsafe {
                             *self.start.add(ray.top as usize) = EXIT;
-                            ray.enter::<L>(inner, &start);
+                            ray.top += 1;
+                            ray.enter(inner, &start);
+                            L::aim(&start.ray, ray);
                         }
-                        ray.top += 1;
                         return;
                     }
                 }
@@ -243,8 +246,10 @@ pub(super) unsafe fn batch<'t, L: Lanes, W: Walker<'t>, const ANY: bool, const F
     let bottoms: [u32; IN_FLIGHT] = std::array::from_fn(|slot| flight.bottom(slot));
     let states = flight.states.as_mut_ptr();
     for (slot, state) in flight.states.iter_mut().enumerate().take(slots) {
+        let start = walker.start(slot);
+        state.begin(slot as u32, tree, &start, bottoms[slot]);
         // SAFETY: the caller has what `L` needs.
-        unsafe { state.begin::<L>(slot as u32, tree, &walker.start(slot), bottoms[slot]) };
+        unsafe { L::aim(&start.ray, state) };
         lists.nodes[0][slot] = slot as u32;
     }
     let (mut next, mut node_count, mut leaf_count) = (slots, slots, 0);
@@ -316,7 +321,9 @@ pub(super) unsafe fn batch<'t, L: Lanes, W: Walker<'t>, const ANY: bool, const F
                         continue;
                     }
                     let bottom = bottoms[slot as usize];
-                    ray.begin::<L>(next as u32, tree, &walker.start(next), bottom);
+                    let start = walker.start(next);
+                    ray.begin(next as u32, tree, &start, bottom);
+                    L::aim(&start.ray, ray);
                     next += 1;
                 }
                 *rest.add(ready) = slot;

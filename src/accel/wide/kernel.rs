@@ -12,13 +12,14 @@ use crate::interaction::Ray;
 /// An implementation may need instructions that not every processor has: its functions must be called, or
 /// rather expanded, only where those may be used.
 pub(super) unsafe trait Lanes: Copy {
-    /// Prepares what follows from the ray's origin and direction; whether they are finite.
+    /// Prepares what follows from the origin and direction of a ray that has been put into a tree; one that is not finite
+    /// ends there.
     ///
     /// # Safety
     /// See the trait.
     #[inline(always)]
-    unsafe fn aim(ray: &Ray, state: &mut State) -> bool {
-        state.aim(ray)
+    unsafe fn aim(ray: &Ray, state: &mut State) {
+        state.aim(ray);
     }
 
     /// Writes the children that the ray enters, farthest first, and returns how many.

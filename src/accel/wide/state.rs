@@ -1,15 +1,12 @@
 //! A ray on its way through a wide tree, prepared as the kernels want it, and the memory in which dozens
 //! of rays have their stacks.
 
-#![allow(unsafe_code)]
-
 use std::hint::select_unpredictable;
 use std::ptr::null;
 
 use glam::Vec3;
 
 use super::Tree;
-use super::kernel::Lanes;
 use super::node::{BOTTOM, Block, DONE, Entry, Node, WIDTH, entry};
 use crate::accel::boxes::RayBoxes;
 use crate::accel::triangle::Shear;
@@ -156,35 +153,19 @@ impl State {
         ray: 0,
     };
 
-    /// Begins with a ray at a tree's root; `bottom` is its stack's.
-    ///
-    /// # Safety
-    /// The processor has what `L` needs.
+    /// Begins with a ray at a tree's root; `bottom` is its stack's. What remains is to aim.
     #[inline(always)]
-    pub(super) unsafe fn begin<L: Lanes>(
-        &mut self,
-        ray: u32,
-        tree: &Tree,
-        start: &Start,
-        bottom: u32,
-    ) {
-        // SAFETY: the caller's word.
-        unsafe { self.enter::<L>(tree, start) };
+    pub(super) fn begin(&mut self, ray: u32, tree: &Tree, start: &Start, bottom: u32) {
+        self.enter(tree, start);
         self.top = bottom + SENTINELS as u32;
         self.ray = ray;
     }
 
-    /// Puts the ray at the root of a tree; its stack stays.
-    ///
-    /// # Safety
-    /// The processor has what `L` needs.
+    /// Puts the ray at the root of a tree; its stack stays. What remains is to aim.
     #[inline(always)]
-    pub(super) unsafe fn enter<L: Lanes>(&mut self, tree: &Tree, start: &Start) {
+    pub(super) fn enter(&mut self, tree: &Tree, start: &Start) {
         // Field by field: a whole state would be made elsewhere and copied, which took most of the time.
-        // SAFETY: the caller's word.
-        let sound = unsafe { L::aim(&start.ray, self) };
-        // A ray that is not finite meets nothing, and its comparisons would go any way.
-        self.reach(select_unpredictable(sound, start.best.t, f32::NEG_INFINITY));
+        self.reach(start.best.t);
         self.nodes = tree.nodes.as_ptr();
         self.blocks = tree.blocks.as_ptr();
         self.current = 0;
@@ -194,9 +175,19 @@ impl State {
         self.instance = start.instance;
     }
 
-    /// Prepares what follows from the ray's origin and direction; whether they are finite.
+    /// Keeps a ray that is not finite from meeting anything: its comparisons would go any way.
     #[inline(always)]
-    pub(super) fn aim(&mut self, ray: &Ray) -> bool {
+    pub(super) fn end_unless(&mut self, finite: bool) {
+        self.reach(select_unpredictable(
+            finite,
+            self.limit(),
+            f32::NEG_INFINITY,
+        ));
+    }
+
+    /// Prepares what follows from the ray's origin and direction.
+    #[inline(always)]
+    pub(super) fn aim(&mut self, ray: &Ray) {
         let (boxes, shear) = (RayBoxes::new(ray), Shear::new(ray));
         let origin = ray.origin.to_array();
         self.inverse = boxes.inverse.to_array();
@@ -212,7 +203,7 @@ impl State {
         self.origin = origin;
         self.direction = ray.direction.to_array();
         self.shear = shear.shear;
-        ray.origin.is_finite() && ray.direction.is_finite()
+        self.end_unless(ray.origin.is_finite() && ray.direction.is_finite());
     }
 
     /// The distance beyond which nothing counts.

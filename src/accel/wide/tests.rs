@@ -45,8 +45,9 @@ fn ray<L: Lanes>(i: u32) -> State {
         },
     };
     let mut state = State::IDLE;
+    state.begin(0, &Tree::default(), &start, 0);
     // SAFETY: the caller has what the kernel needs.
-    unsafe { state.begin::<L>(0, &Tree::default(), &start, 0) };
+    unsafe { L::aim(&start.ray, &mut state) };
     state.lanes = random::bits(5, i) as u8 & 15;
     state
 }
