@@ -3,6 +3,7 @@
 use super::Kernel;
 use crate::description::Properties;
 use crate::error::Result;
+use crate::math::exp::exp;
 
 /// A truncated Gaussian.
 #[derive(Clone, Debug)]
@@ -34,8 +35,9 @@ impl Gaussian {
 }
 
 /// exp(−x²/2).
+#[inline]
 fn bell(x: f32) -> f32 {
-    (-0.5 * x * x).exp()
+    exp(-0.5 * x * x)
 }
 
 impl Default for Gaussian {

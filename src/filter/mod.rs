@@ -18,6 +18,12 @@ pub trait Kernel: std::fmt::Debug + Send + Sync {
     fn radius(&self) -> f32;
     /// The weight at a distance of |x| pixels; zero beyond the radius.
     fn eval(&self, x: f32) -> f32;
+    /// The weights at `first`, `first` + 1, … pixels.
+    fn weights(&self, first: f32, weights: &mut [f32]) {
+        for (i, weight) in weights.iter_mut().enumerate() {
+            *weight = self.eval(first + i as f32);
+        }
+    }
 }
 
 family! {
@@ -96,6 +102,11 @@ mod tests {
                 "{name}"
             );
             assert_eq!(filter.eval(filter.radius() + 1e-3), 0.0, "{name}");
+            let mut weights = [0.0; 5];
+            filter.weights(-2.3, &mut weights);
+            for (weight, x) in weights.into_iter().zip([-2.3, -1.3, -0.3, 0.7, 1.7]) {
+                assert!((weight - filter.eval(x)).abs() < 1e-6, "{name}");
+            }
         }
     }
 }

@@ -4,6 +4,7 @@
 
 pub mod distribution;
 pub mod erf;
+pub mod exp;
 pub mod frame;
 pub mod offset;
 pub mod quadrature;

@@ -19,8 +19,8 @@ pub(super) fn border(filter: &Filter) -> u32 {
     (filter.radius() + 0.5).ceil() as u32 - 1
 }
 
-/// The most pixels along an axis that a sample reaches.
-const MAX_REACH: usize = 2 * (MAX_RADIUS as usize + 1) + 1;
+/// The most pixels along an axis that a sample reaches, as a multiple of four.
+const MAX_REACH: usize = (2 * (MAX_RADIUS as usize + 1) + 1).next_multiple_of(4);
 
 /// Seconds of threads that estimate samples, by what they do.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
@@ -278,37 +278,39 @@ pub(super) fn splat(
         height: 1,
     };
     let reached = center.grown(border(filter), window);
-    // One kernel value a column and a row; relative to the sample's own pixel, where f32 is exact.
-    let weight = |pixel: u32, own: u32, offset: f32| {
-        filter.eval((f64::from(pixel) - f64::from(own)) as f32 + 0.5 - offset)
+    let weights = |first: u32, own: u32, offset: f32, count: u32| {
+        let mut weights = [0.0; MAX_REACH];
+        // Relative to the sample's own pixel, so that they do not depend on where on the film it is; some more than
+        // are wanted, for four are found at a time.
+        let first = (f64::from(first) - f64::from(own)) as f32 + 0.5 - offset;
+        filter.weights(first, &mut weights[..count.next_multiple_of(4) as usize]);
+        weights
     };
-    let mut columns = [0.0; MAX_REACH];
-    for (column, px) in columns.iter_mut().zip(reached.x..reached.x + reached.width) {
-        *column = weight(px, x, offset.x);
-    }
+    let columns = weights(reached.x, x, offset.x, reached.width);
+    let rows = weights(reached.y, y, offset.y, reached.height);
     let stride = values.len() + 1;
-    for py in reached.y..reached.y + reached.height {
-        let wy = weight(py, y, offset.y);
-        for (px, wx) in (reached.x..reached.x + reached.width).zip(columns) {
-            let w = f64::from(wy * wx);
-            if w == 0.0 {
-                continue;
-            }
-            let index = (py - window.y) as usize * window.width as usize + (px - window.x) as usize;
-            let pixel = &mut data[index * stride..(index + 1) * stride];
-            pixel[0] += w;
-            // Most films have four channels, and a loop whose length is known costs half.
-            match (&mut pixel[1..], values) {
-                ([r, g, b, a], [to_r, to_g, to_b, to_a]) => {
-                    *r += w * f64::from(*to_r);
-                    *g += w * f64::from(*to_g);
-                    *b += w * f64::from(*to_b);
-                    *a += w * f64::from(*to_a);
+    let (left, width) = ((reached.x - window.x) as usize, reached.width as usize);
+    for (py, wy) in (reached.y..reached.y + reached.height).zip(rows) {
+        let start = (py - window.y) as usize * window.width as usize + left;
+        let row = &mut data[start * stride..][..width * stride];
+        // Most films have four channels, and a loop whose length is known costs a fraction. Weights of 0 are added
+        // too: which they are is random, and a branch that cannot be foretold costs more.
+        if let &[r, g, b, a] = values {
+            let values = [r, g, b, a].map(f64::from);
+            let (row, _) = row.as_chunks_mut::<5>();
+            for ([weight, sums @ ..], wx) in row.iter_mut().zip(&columns) {
+                let w = f64::from(wy * wx);
+                *weight += w;
+                for (sum, value) in sums.iter_mut().zip(values) {
+                    *sum += w * value;
                 }
-                (sums, values) => {
-                    for (sum, value) in sums.iter_mut().zip(values) {
-                        *sum += w * f64::from(*value);
-                    }
+            }
+        } else {
+            for (pixel, wx) in row.chunks_exact_mut(stride).zip(&columns) {
+                let w = f64::from(wy * wx);
+                pixel[0] += w;
+                for (sum, value) in pixel[1..].iter_mut().zip(values) {
+                    *sum += w * f64::from(*value);
                 }
             }
         }
