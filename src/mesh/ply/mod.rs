@@ -309,35 +309,47 @@ impl Ply<'_> {
         // The first face may be none, as all others.
         let mut block = ROW;
         loop {
-            let shown = self.source.peek(block)?;
+            let (rows, _) = self.source.peek(block)?.as_chunks::<ROW>();
             let left = usize::try_from(most - done(triangles)).unwrap_or(usize::MAX);
-            let rows = shown.chunks_exact(ROW).take(left);
-            let used = ROW * rows.take_while(|row| row[0] == 3).count();
-            if used == 0 {
+            let rows = &rows[..rows.len().min(left)];
+            let are_triangles = |rows: &[[u8; ROW]]| rows.iter().all(|row| row[0] == 3);
+            // Among polygons there are many short runs.
+            let many = rows.len() >= GRAIN
+                && are_triangles(&rows[..GRAIN])
+                && rows.par_chunks(GRAIN).all(are_triangles);
+            let rows = if many {
+                rows
+            } else {
+                let end = rows.iter().position(|row| row[0] != 3);
+                &rows[..end.unwrap_or(rows.len())]
+            };
+            if rows.is_empty() {
                 return Ok(done(triangles));
             }
             let first = triangles.len();
-            let triangle = |row: &[u8]| {
-                [1, 5, 9].map(|at| {
-                    let bytes = *row[at..].first_chunk().expect("a row has 13 bytes");
-                    match encoding {
-                        Encoding::BigEndian => u32::from_be_bytes(bytes),
-                        _ => u32::from_le_bytes(bytes),
-                    }
+            let triangle = |&[_, ref row @ ..]: &[u8; ROW]| {
+                let (indices, _) = row.as_chunks();
+                std::array::from_fn(|i| match encoding {
+                    Encoding::BigEndian => u32::from_be_bytes(indices[i]),
+                    _ => u32::from_le_bytes(indices[i]),
                 })
             };
-            let rows = &shown[..used];
-            if used < GRAIN * ROW {
-                // Among polygons there are many short runs.
-                triangles.extend(rows.chunks_exact(ROW).map(triangle));
-            } else {
-                let rows = rows.par_chunks_exact(ROW).with_min_len(GRAIN);
+            if many {
+                let rows = rows.par_iter().with_min_len(GRAIN);
                 triangles.par_extend(rows.map(triangle));
+            } else {
+                triangles.extend(rows.iter().map(triangle));
             }
+            let used = ROW * rows.len();
             self.source.consume(used);
-            let indices = triangles[first..].iter().flatten();
-            let highest = indices.fold(0, |highest, index| highest.max(*index));
-            if u64::from(highest) >= self.vertices {
+            let new = triangles[first..].as_flattened();
+            let highest = new.par_chunks(3 * GRAIN).map(|indices| {
+                // A fold with max is a loop over lanes; the iterator's own is none.
+                indices
+                    .iter()
+                    .fold(0, |highest: u32, index| highest.max(*index))
+            });
+            if highest.max().map(u64::from) >= Some(self.vertices) {
                 let is_wrong = |t: &[u32; 3]| t.iter().any(|&i| u64::from(i) >= self.vertices);
                 let at = first + triangles[first..].iter().position(is_wrong).unwrap_or(0);
                 let wrong = triangles[at].into_iter().fold(0, u32::max);
