@@ -91,8 +91,8 @@ impl<const N: usize> ColorModel for Bands<N> {
     type Sample = Samples<N>;
 
     #[inline]
-    fn wavelengths(&self, u: f32) -> [f32; N] {
-        let width = self.width();
+    fn wavelengths(&self, u: impl FnOnce() -> f32) -> [f32; N] {
+        let (u, width) = (u(), self.width());
         std::array::from_fn(|i| {
             if i < self.count {
                 cie::FIRST + (i as f32 + u) * width
@@ -240,7 +240,7 @@ mod tests {
         let mut sum = [0.0; 3];
         let n = 200;
         for i in 0..n {
-            let w = bands.wavelengths((i as f32 + 0.5) / n as f32);
+            let w = bands.wavelengths(|| (i as f32 + 0.5) / n as f32);
             let mut out = vec![0.0; 3 + count];
             let value =
                 Bands::<N>::evaluate(&color, &w) * Bands::<N>::evaluate(&light, &w) * bands.unit();

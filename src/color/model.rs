@@ -43,8 +43,8 @@ pub trait ColorModel: Clone + std::fmt::Debug + Send + Sync + 'static {
     /// One value for each of them.
     type Sample: Spectral;
 
-    /// The wavelengths of a path, from a random number in [0, 1).
-    fn wavelengths(&self, u: f32) -> Self::Wavelengths;
+    /// The wavelengths of a path, from a random number in [0, 1), which is drawn where there are any.
+    fn wavelengths(&self, u: impl FnOnce() -> f32) -> Self::Wavelengths;
     /// The throughput at a path's start: 1 in each channel in use.
     fn unit(&self) -> Self::Sample;
     /// A scene's colour in its stored form; the error says what is wrong with the value.

@@ -15,7 +15,7 @@ impl ColorModel for Mono {
     type Wavelengths = ();
     type Sample = Samples<1>;
 
-    fn wavelengths(&self, _u: f32) {}
+    fn wavelengths(&self, _u: impl FnOnce() -> f32) {}
 
     fn unit(&self) -> Samples<1> {
         Samples([1.0])

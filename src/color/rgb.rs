@@ -16,7 +16,7 @@ impl ColorModel for Rgb {
     type Wavelengths = ();
     type Sample = Samples<3>;
 
-    fn wavelengths(&self, _u: f32) {}
+    fn wavelengths(&self, _u: impl FnOnce() -> f32) {}
 
     fn unit(&self) -> Samples<3> {
         Samples([1.0; 3])

@@ -9,7 +9,7 @@ use super::{Context, Cost, Estimate, Estimates, Estimator, FIRST_DIMENSION, Star
 use crate::color::{ColorModel, Spectral};
 use crate::description::Properties;
 use crate::error::Result;
-use crate::interaction::{Hit, Interaction, Ray};
+use crate::interaction::{Interaction, Ray};
 use crate::light::LightSample;
 use crate::sampler::{Sampler, Stream};
 use crate::scene::Scene;
@@ -107,20 +107,18 @@ impl Path {
         })
     }
 
-    /// What the ray meets at its end: its emission goes to the estimate; the point is where the path
-    /// goes on, if it does.
-    fn arrive<'s, C: ColorModel>(
+    /// Adds to the estimate what comes from the ray's end: the point `at`, or the surroundings.
+    fn arrive<C: ColorModel>(
         &self,
-        scene: &'s Scene<C>,
+        scene: &Scene<C>,
         depth: u32,
         walker: &Walker<C>,
-        hit: &Hit,
+        at: Option<&Interaction<'_>>,
         estimate: &mut Estimate<C::Sample>,
-    ) -> Option<Interaction<'s>> {
+    ) {
         let hidden = depth == 0 && self.hide_emitters;
         let from = walker.scattered.map_or(walker.ray.origin, |(from, _)| from);
-        let at = (!hit.is_miss()).then(|| scene.interaction(&walker.ray, hit));
-        let emission = match &at {
+        let emission = match at {
             Some(at) => scene.emitted(at, from, &walker.wavelengths),
             None => scene.surrounding(walker.ray.direction, &walker.wavelengths),
         };
@@ -131,14 +129,13 @@ impl Path {
             estimate.radiance += walker.throughput * radiance * weight;
         }
         let ambient = |at| scene.ambient(at, &walker.wavelengths);
-        if let Some(ambient) = at.as_ref().and_then(ambient) {
+        if let Some(ambient) = at.and_then(ambient) {
             estimate.radiance += walker.throughput * ambient;
         }
         if depth == 0 {
             let surrounded = scene.has_environment() && !self.hide_emitters;
             estimate.alpha = if at.is_some() || surrounded { 1.0 } else { 0.0 };
         }
-        at
     }
 
     /// Light drawn toward `at`, if any may arrive.
@@ -178,30 +175,36 @@ impl Path {
         })
     }
 
-    /// Turns the path at `at`; `None` where it ends there.
+    /// Turns the path at `at`; whether it goes on.
     fn scatter<C: ColorModel>(
         &self,
         scene: &Scene<C>,
         sampler: &Sampler,
         depth: u32,
-        mut walker: Walker<C>,
+        walker: &mut Walker<C>,
         at: &Interaction<'_>,
-    ) -> Option<Walker<C>> {
+    ) -> bool {
         let u2 = walker.stream.next_2d(sampler);
         let u1 = walker.stream.next_1d(sampler);
-        let sample = scene
-            .material(at)
-            .sample(at, at.wi, u1, u2, &walker.wavelengths)?;
+        let material = scene.material(at);
+        let Some(sample) = material.sample(at, at.wi, u1, u2, &walker.wavelengths) else {
+            return false;
+        };
         walker.throughput *= sample.weight;
         walker.eta *= sample.eta;
         walker.ray = at.spawn(at.frame.to_world(sample.wo));
         walker.scattered = (!sample.delta).then_some((at.position, sample.pdf));
-        let survival = self.limits.survival(depth, walker.throughput, walker.eta)?;
-        if survival < 1.0 && walker.stream.next_1d(sampler) >= survival {
-            return None;
+        let survival = self.limits.survival(depth, walker.throughput, walker.eta);
+        let Some(survival) = survival else {
+            return false;
+        };
+        if survival < 1.0 {
+            if walker.stream.next_1d(sampler) >= survival {
+                return false;
+            }
+            walker.throughput = walker.throughput / survival;
         }
-        walker.throughput = walker.throughput / survival;
-        Some(walker)
+        true
     }
 }
 
@@ -250,26 +253,23 @@ impl<C: ColorModel> Estimator<C> for Path {
             cost.closest(scene, depth, &rays, &mut hits);
 
             let mut hits = hits.iter();
-            walkers = walkers
-                .into_iter()
-                .filter_map(|mut walker| {
-                    let hit = hits.next().expect("every ray has its hit");
-                    let at = self.arrive(
-                        scene,
-                        depth,
-                        &walker,
-                        hit,
-                        &mut estimates[walker.slot as usize],
-                    )?;
-                    if depth + 1 >= self.limits.max_depth {
-                        return None;
-                    }
-                    cost.stats.shaded += 1;
-                    walker.stream.seek(FIRST_DIMENSION + depth * DIMENSIONS);
-                    shadows.extend(Self::light(scene, sampler, &mut walker, &at));
-                    self.scatter(scene, sampler, depth, walker, &at)
-                })
-                .collect();
+            walkers.retain_mut(|walker| {
+                let hit = hits.next().expect("every ray has its hit");
+                let estimate = &mut estimates[walker.slot as usize];
+                if hit.is_miss() {
+                    self.arrive(scene, depth, walker, None, estimate);
+                    return false;
+                }
+                let at = scene.interaction(&walker.ray, hit);
+                self.arrive(scene, depth, walker, Some(&at), estimate);
+                if depth + 1 >= self.limits.max_depth {
+                    return false;
+                }
+                cost.stats.shaded += 1;
+                walker.stream.seek(FIRST_DIMENSION + depth * DIMENSIONS);
+                shadows.extend(Self::light(scene, sampler, walker, &at));
+                self.scatter(scene, sampler, depth, walker, &at)
+            });
 
             cost.occluded(scene, shadows.iter().map(|s| s.ray), &mut blocked);
             for (shadow, _) in shadows

@@ -69,11 +69,14 @@ impl<C: ColorModel> Emitter<C> for Area<C> {
         if direction.dot(point.normal) >= 0.0 {
             return None;
         }
-        let at = interaction(&self.shape, &point);
+        let radiance = match &self.radiance {
+            Texture::Uniform(radiance) => C::evaluate(radiance.value(), wavelengths),
+            texture => texture.eval(&interaction(&self.shape, &point), wavelengths),
+        };
         Some(LightSample {
             direction,
             target: Some(point.position),
-            radiance: self.radiance.eval(&at, wavelengths),
+            radiance,
             pdf: point.pdf,
             delta: false,
         })

@@ -82,7 +82,7 @@ impl Brightness {
         shape: &Geometry,
         color: &C,
     ) -> (f64, Option<Self>) {
-        let wavelengths = color.wavelengths(0.5);
+        let wavelengths = color.wavelengths(|| 0.5);
         let look = |at: &Interaction<'_>| mean_lane(color, radiance.eval(at, &wavelengths));
         let mut sums = Sums::default();
         let (weights, areas): (Vec<f64>, Vec<f64>);

@@ -147,14 +147,14 @@ fn mean_lane<C: ColorModel>(color: &C, sample: C::Sample) -> f64 {
 fn mean_of<C: ColorModel>(color: &C, stored: &C::Stored) -> f64 {
     const SHIFTS: u16 = 64;
     let shift = |i| (f32::from(i) + 0.5) / f32::from(SHIFTS);
-    let value = |i| mean_lane(color, C::evaluate(stored, &color.wavelengths(shift(i))));
+    let value = |i| mean_lane(color, C::evaluate(stored, &color.wavelengths(|| shift(i))));
     (0..SHIFTS).map(value).sum::<f64>() / f64::from(SHIFTS)
 }
 
 /// The mean of a texture over the unit square.
 fn mean_over_square<C: ColorModel>(color: &C, texture: &Texture<C>) -> f64 {
     const SIDE: u16 = 64;
-    let wavelengths = color.wavelengths(0.5);
+    let wavelengths = color.wavelengths(|| 0.5);
     let along = |i| (f32::from(i) + 0.5) / f32::from(SIDE);
     let points = (0..SIDE).flat_map(|y| (0..SIDE).map(move |x| Vec2::new(along(x), along(y))));
     let value = |uv| mean_lane(color, texture.eval(&Interaction::at_uv(uv), &wavelengths));

@@ -278,7 +278,10 @@ fn samples<C: ColorModel>(color: &C, texture: &Texture<C>) -> impl Iterator<Item
     let step = |i: u16| (f32::from(i) + 0.5) / f32::from(STEPS);
     (0..STEPS * STEPS).map(move |i| {
         let uv = Vec2::new(step(i % STEPS), step(i / STEPS));
-        texture.eval(&Interaction::at_uv(uv), &color.wavelengths(step(i % STEPS)))
+        texture.eval(
+            &Interaction::at_uv(uv),
+            &color.wavelengths(|| step(i % STEPS)),
+        )
     })
 }
 

@@ -46,11 +46,7 @@ impl Discrete {
     /// An index for `u` in [0, 1), never one of weight 0.
     pub fn sample(&self, u: f32) -> Drawn {
         let target = f64::from(u) * self.total();
-        let after = self.cumulative.partition_point(|&c| c <= target);
-        let mut index = after.clamp(1, self.cumulative.len() - 1) - 1;
-        while self.cumulative[index + 1] <= self.cumulative[index] {
-            index -= 1; // only rounding at the upper end leads here
-        }
+        let index = self.find(target);
         let (low, high) = (self.cumulative[index], self.cumulative[index + 1]);
         let rest = (((target - low) / (high - low)) as f32).clamp(0.0, 1f32.next_down());
         Drawn {
@@ -58,6 +54,20 @@ impl Discrete {
             probability: (high - low) / self.total(),
             rest,
         }
+    }
+
+    /// The index alone of [`Self::sample`].
+    pub fn index(&self, u: f32) -> usize {
+        self.find(f64::from(u) * self.total())
+    }
+
+    fn find(&self, target: f64) -> usize {
+        let after = self.cumulative.partition_point(|&c| c <= target);
+        let mut index = after.clamp(1, self.cumulative.len() - 1) - 1;
+        while self.cumulative[index + 1] <= self.cumulative[index] {
+            index -= 1; // only rounding at the upper end leads here
+        }
+        index
     }
 }
 

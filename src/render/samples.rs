@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use glam::Vec2;
 
-use super::prepare::Job;
+use super::prepare::{Job, View};
 use super::progress::Progress;
 use super::sums::Tally;
 use crate::color::ColorModel;
@@ -80,6 +80,11 @@ pub(super) trait Sink {
     fn take(&mut self, place: &Place, channels: &[f32]);
 }
 
+/// The dimensions of a camera sample, after those of its place in the pixel.
+const LENS: u32 = 2;
+const TIME: u32 = 4;
+const WAVELENGTH: u32 = 5;
+
 /// A path's start, and its place within the pixel.
 fn camera_sample<C: ColorModel>(
     job: &Job<'_, C>,
@@ -87,16 +92,31 @@ fn camera_sample<C: ColorModel>(
     [x, y]: [u32; 2],
     mut stream: Stream,
 ) -> (Start<C>, Vec2) {
+    let View { sensor, film, .. } = &job.view;
     let offset = stream.next_2d(sampler);
-    let lens = stream.next_2d(sampler);
-    let (open, close) = job.view.sensor.shutter();
-    let time = open + stream.next_1d(sampler) * (close - open);
-    let wavelengths = job.scene.color().wavelengths(stream.next_1d(sampler));
-    let film = Vec2::new(x as f32 + offset.x, y as f32 + offset.y)
-        / Vec2::new(job.view.film.width as f32, job.view.film.height as f32);
+    // What nobody looks at is not drawn: it would cost a fifth of a short path.
+    let lens = if sensor.has_lens() {
+        stream.seek(LENS);
+        stream.next_2d(sampler)
+    } else {
+        Vec2::ZERO
+    };
+    let (open, close) = sensor.shutter();
+    let time = if open < close {
+        stream.seek(TIME);
+        open + stream.next_1d(sampler) * (close - open)
+    } else {
+        open
+    };
+    let wavelengths = job.scene.color().wavelengths(|| {
+        stream.seek(WAVELENGTH);
+        stream.next_1d(sampler)
+    });
+    let place = Vec2::new(x as f32 + offset.x, y as f32 + offset.y)
+        / Vec2::new(film.width as f32, film.height as f32);
     (
         Start {
-            ray: job.view.sensor.ray(film, lens, time),
+            ray: sensor.ray(place, lens, time),
             wavelengths,
             stream,
         },

@@ -11,7 +11,6 @@ use crate::color::ColorModel;
 use crate::error::Result;
 use crate::filter::Filter;
 use crate::sampler::Stream;
-use crate::sensor::Window;
 
 /// Renders the job's crop, going on from what `keeper` kept, until `progress` asks to stop.
 pub(super) fn render<C: ColorModel>(
@@ -57,16 +56,9 @@ fn render_unit<C: ColorModel>(
     let reach = tile.grown(border(&film.filter), &film.full());
     let sums = Sums::new(reach, job.channels()).expect("a tile is small");
     let mut sink = Splat(sums, &film.filter);
-    let pixels = (tile.y..tile.y + tile.height)
-        .flat_map(|y| (tile.x..tile.x + tile.width).map(move |x| (x, y)))
-        .filter(|(x, y)| {
-            plan.needed.contains(&Window {
-                x: *x,
-                y: *y,
-                width: 1,
-                height: 1,
-            })
-        });
+    let own = tile.grown(0, &plan.needed);
+    let pixels =
+        (own.y..own.y + own.height).flat_map(|y| (own.x..own.x + own.width).map(move |x| (x, y)));
     let samples = pixels.flat_map(|(x, y)| {
         let at = move |index| ([x, y], Stream::new(job.seed, x, y, index));
         indices.clone().map(at)

@@ -71,8 +71,7 @@ impl Choice {
 
     /// The light for `u` in [0, 1).
     pub(super) fn sample(&self, u: f32) -> Option<LightId> {
-        let drawn = self.lights.as_ref()?.sample(u);
-        Some(LightId(drawn.index as u32))
+        Some(LightId(self.lights.as_ref()?.index(u) as u32))
     }
 
     /// How likely a light is.

@@ -21,6 +21,10 @@ pub trait Camera: std::fmt::Debug + Send + Sync {
     /// The ray through `film` (in [0, 1]², x to the right and y down over the full film) and the lens
     /// point `lens` (in [0, 1]²), at `time`.
     fn ray(&self, film: Vec2, lens: Vec2, time: f32) -> Ray;
+    /// Whether the lens point matters.
+    fn has_lens(&self) -> bool {
+        false
+    }
     /// From world to camera space: z forward, y up, x to the image's left.
     fn world_to_camera(&self) -> Mat4;
     /// From camera space to clip space: x right and y up in [−1, 1], z in [0, 1] from near to far.

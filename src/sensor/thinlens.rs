@@ -120,6 +120,10 @@ impl Camera for ThinLens {
             .ray_through(film, lens, self.focus_distance, time)
     }
 
+    fn has_lens(&self) -> bool {
+        true
+    }
+
     fn world_to_camera(&self) -> Mat4 {
         self.pinhole.world_to_camera()
     }
