@@ -171,7 +171,7 @@ fn interaction<'s>(shape: &'s Geometry, point: &SurfaceSample) -> Interaction<'s
         primitive: point.primitive,
         barycentric: point.barycentric,
         mesh: shape.mesh(),
-        ..texture_point(point.position, normal, point.uv)
+        ..texture_point(point.position, normal, shape.uv(point))
     }
 }
 

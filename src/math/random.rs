@@ -68,7 +68,9 @@ pub fn permute(mut i: u32, n: u32, key: u64) -> u32 {
         i &= w;
         i ^= i >> 5;
         if i < n {
-            return (((u64::from(i)) + u64::from(p)) % u64::from(n)) as u32;
+            // (i + p) mod n, by a division that need not wait for i.
+            let back = n - p % n;
+            return if i >= back { i - back } else { i + (n - back) };
         }
     }
 }

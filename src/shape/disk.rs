@@ -59,14 +59,13 @@ impl Disk {
         SurfaceSample {
             position: self.position(p),
             normal: self.normal,
-            uv: Self::uv(p),
             primitive: 0,
             barycentric: Vec2::ZERO,
             pdf: 0.0,
         }
     }
 
-    fn uv(p: Vec2) -> Vec2 {
+    fn polar(p: Vec2) -> Vec2 {
         Vec2::new(p.length(), turns(p))
     }
 
@@ -117,7 +116,7 @@ impl Surface for Disk {
             error: self.error(),
             normal: self.normal,
             frame,
-            uv: Self::uv(p),
+            uv: Self::polar(p),
             dp_du,
             dp_dv: TAU * (y * p.x - x * p.y),
             wi: frame.to_local(-ray.direction),
@@ -138,6 +137,11 @@ impl Surface for Disk {
         let sample = self.at(p);
         let pdf = area_to_solid_angle(self.area, from, sample.position, self.normal);
         (pdf > 0.0).then_some(SurfaceSample { pdf, ..sample })
+    }
+
+    fn uv(&self, point: &SurfaceSample) -> Vec2 {
+        let local = self.to_local.transform_point3(point.position.as_dvec3());
+        Self::polar(local.truncate().as_vec2())
     }
 
     fn pdf(&self, from: Vec3, at: &Interaction<'_>) -> f32 {

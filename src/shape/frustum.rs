@@ -154,7 +154,6 @@ impl Frustum {
         let point = SurfaceSample {
             position: self.to_world.transform_point3(local).as_vec3(),
             normal: self.normal(around),
-            uv,
             primitive: 0,
             barycentric: Vec2::ZERO,
             pdf: 0.0,
@@ -189,6 +188,11 @@ impl Frustum {
             .map(|t| near + t)
             .find(|&t| t as f32 > 0.0 && t as f32 <= ray.t_max)
     }
+}
+
+/// The texture coordinates of the side.
+fn unrolled(around: DVec2, height: f64) -> Vec2 {
+    Vec2::new(turns(around.as_vec2()), height as f32)
 }
 
 impl Surface for Frustum {
@@ -239,7 +243,7 @@ impl Surface for Frustum {
             error: rounding(&self.to_world, local, position),
             normal,
             frame,
-            uv: Vec2::new(turns(around.as_vec2()), height as f32),
+            uv: unrolled(around, height),
             dp_du,
             dp_dv: up.as_vec3(),
             wi: frame.to_local(-ray.direction),
@@ -272,6 +276,15 @@ impl Surface for Frustum {
         let (around, point) = self.at(Vec2::new(u.x, height as f32));
         let pdf = self.density(from, point.position, around, point.normal);
         (pdf > 0.0).then_some(SurfaceSample { pdf, ..point })
+    }
+
+    fn uv(&self, point: &SurfaceSample) -> Vec2 {
+        if let Some(end) = point.primitive.checked_sub(1) {
+            return self.ends[end as usize].uv(point);
+        }
+        let local = self.to_local.transform_point3(point.position.as_dvec3());
+        let (around, height) = self.nearest(local);
+        unrolled(around, height)
     }
 
     /// By the side's texture coordinates; none where there are ends as well.

@@ -84,35 +84,34 @@ impl TriangleMesh {
             barycentric: b,
         } = place;
         let corners = self.corners(triangle);
-        let (normal, uv) = self.shading(triangle, b, self.triangle_normal(triangle));
         SurfaceSample {
             position: b[0] * corners[0] + b[1] * corners[1] + b[2] * corners[2],
-            normal,
-            uv,
+            normal: self.shading_normal(triangle, b, self.triangle_normal(triangle)),
             primitive: triangle,
             barycentric: Vec2::new(b[1], b[2]),
             pdf: 0.0,
         }
     }
 
-    /// The shading normal and the texture coordinates at a point of a triangle.
-    fn shading(&self, triangle: u32, b: [f32; 3], geometric: Vec3) -> (Vec3, Vec2) {
-        let corners = self.mesh.triangles[triangle as usize];
-        let mut normal = geometric;
-        if !self.mesh.normals.is_empty() {
-            let [n0, n1, n2] = corners.map(|i| self.mesh.normals[i as usize]);
-            let n = (b[0] * n0 + b[1] * n1 + b[2] * n2).normalize_or_zero();
-            if n != Vec3::ZERO {
-                normal = n;
-            }
+    /// The shading normal at a point of a triangle.
+    fn shading_normal(&self, triangle: u32, b: [f32; 3], geometric: Vec3) -> Vec3 {
+        if self.mesh.normals.is_empty() {
+            return geometric;
         }
-        let uv = if self.mesh.uvs.is_empty() {
-            Vec2::new(b[1], b[2])
-        } else {
-            let [uv0, uv1, uv2] = corners.map(|i| self.mesh.uvs[i as usize]);
-            b[0] * uv0 + b[1] * uv1 + b[2] * uv2
-        };
-        (normal, uv)
+        let corners = self.mesh.triangles[triangle as usize];
+        let [n0, n1, n2] = corners.map(|i| self.mesh.normals[i as usize]);
+        let n = (b[0] * n0 + b[1] * n1 + b[2] * n2).normalize_or_zero();
+        if n == Vec3::ZERO { geometric } else { n }
+    }
+
+    /// The texture coordinates at a point of a triangle.
+    fn uv_at(&self, triangle: u32, b: [f32; 3]) -> Vec2 {
+        if self.mesh.uvs.is_empty() {
+            return Vec2::new(b[1], b[2]);
+        }
+        let corners = self.mesh.triangles[triangle as usize];
+        let [uv0, uv1, uv2] = corners.map(|i| self.mesh.uvs[i as usize]);
+        b[0] * uv0 + b[1] * uv1 + b[2] * uv2
     }
 
     fn geometric_normal([a, b, c]: [Vec3; 3]) -> Vec3 {
@@ -167,7 +166,7 @@ impl Surface for TriangleMesh {
         let position = terms[0] + terms[1] + terms[2];
         let error = offset::gamma(7) * (terms[0].abs() + terms[1].abs() + terms[2].abs());
         let normal = Self::geometric_normal(corners);
-        let (shading, uv) = self.shading(hit.primitive, b, normal);
+        let shading = self.shading_normal(hit.primitive, b, normal);
         let (dp_du, dp_dv) = self.tangents(hit.primitive, corners);
         let frame = Frame::along(shading, dp_du);
         Interaction {
@@ -176,7 +175,7 @@ impl Surface for TriangleMesh {
             error,
             normal,
             frame,
-            uv,
+            uv: self.uv_at(hit.primitive, b),
             dp_du,
             dp_dv,
             wi: frame.to_local(-ray.direction),
@@ -208,6 +207,11 @@ impl Surface for TriangleMesh {
         let normal = self.triangle_normal(triangle);
         let pdf = area_to_solid_angle(areas.total(), from, sample.position, normal);
         (pdf > 0.0).then_some(SurfaceSample { pdf, ..sample })
+    }
+
+    fn uv(&self, point: &SurfaceSample) -> Vec2 {
+        let Vec2 { x, y } = point.barycentric;
+        self.uv_at(point.primitive, [1.0 - x - y, x, y])
     }
 
     fn pdf(&self, from: Vec3, at: &Interaction<'_>) -> f32 {

@@ -122,8 +122,6 @@ pub struct SurfaceSample {
     pub position: Vec3,
     /// Unit length, on the side that emits.
     pub normal: Vec3,
-    /// Texture coordinates.
-    pub uv: Vec2,
     /// The primitive.
     pub primitive: u32,
     /// The second and third barycentric coordinate on a triangle.
@@ -156,6 +154,8 @@ pub trait Surface: std::fmt::Debug + Send + Sync {
     fn area(&self) -> f64;
     /// A point drawn on the surface for light at `from`; `None` where none can be.
     fn sample(&self, from: Vec3, u: Vec2) -> Option<SurfaceSample>;
+    /// The texture coordinates of a point that was drawn: few ask for them, and a sphere's take long.
+    fn uv(&self, point: &SurfaceSample) -> Vec2;
     /// The density with which [`Surface::sample`] would have drawn the point `at`, which is visible
     /// from `from`.
     fn pdf(&self, from: Vec3, at: &Interaction<'_>) -> f32;

@@ -90,6 +90,10 @@ impl Surface for Plane {
         f64::INFINITY
     }
 
+    fn uv(&self, _point: &SurfaceSample) -> Vec2 {
+        unreachable!("no point of a plane is drawn")
+    }
+
     fn sample(&self, _from: Vec3, _u: Vec2) -> Option<SurfaceSample> {
         None
     }

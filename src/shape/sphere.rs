@@ -82,18 +82,17 @@ impl Sphere {
     }
 
     /// The point in that direction from the centre, without a density.
-    fn at(&self, outward: Vec3, uv: Vec2) -> SurfaceSample {
+    fn at(&self, outward: Vec3) -> SurfaceSample {
         SurfaceSample {
             position: self.center + self.radius * outward,
             normal: self.side() * outward,
-            uv,
             primitive: 0,
             barycentric: Vec2::ZERO,
             pdf: 0.0,
         }
     }
 
-    fn uv(&self, outward: Vec3) -> Vec2 {
+    fn angles(&self, outward: Vec3) -> Vec2 {
         let local = self.rotation.transpose() * outward;
         let phi = local.y.atan2(local.x);
         let phi = if phi < 0.0 { phi + TAU } else { phi };
@@ -164,7 +163,7 @@ impl Surface for Sphere {
             error,
             normal,
             frame,
-            uv: self.uv(outward),
+            uv: self.angles(outward),
             dp_du,
             dp_dv,
             wi: frame.to_local(-ray.direction),
@@ -183,7 +182,7 @@ impl Surface for Sphere {
     fn sample(&self, from: Vec3, u: Vec2) -> Option<SurfaceSample> {
         let Some(widest) = self.cone(from) else {
             let outward = warp::uniform_sphere(u);
-            let sample = self.at(outward, self.uv(outward));
+            let sample = self.at(outward);
             let pdf = area_to_solid_angle(self.area(), from, sample.position, outward);
             return (pdf > 0.0).then_some(SurfaceSample { pdf, ..sample });
         };
@@ -205,8 +204,12 @@ impl Surface for Sphere {
             .normalize();
         Some(SurfaceSample {
             pdf: warp::uniform_cone_pdf(Self::drop(widest) as f32),
-            ..self.at(outward, self.uv(outward))
+            ..self.at(outward)
         })
+    }
+
+    fn uv(&self, point: &SurfaceSample) -> Vec2 {
+        self.angles(self.side() * point.normal)
     }
 
     fn pdf(&self, from: Vec3, at: &Interaction<'_>) -> f32 {
@@ -222,7 +225,7 @@ impl Surface for Sphere {
         let (sin, cos) = (PI * parameters.y).sin_cos();
         let outward = self.rotation * Vec3::new(sin * cos_phi, sin * sin_phi, cos);
         Some(Chart {
-            point: self.at(outward, parameters),
+            point: self.at(outward),
             stretch: f64::from(TAU * PI * sin.abs()) * f64::from(self.radius).powi(2),
         })
     }
