@@ -40,6 +40,20 @@ pub(crate) fn stream_atomically(
     Ok(())
 }
 
+/// Leaves a file for the next time, whole or not at all, in a folder that is made where it is not there. It may be lost
+/// with the machine's power: nobody waits for the disk.
+pub(crate) fn leave(
+    path: &Path,
+    write: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
+) -> std::io::Result<()> {
+    let folder = folder_of(path);
+    fs::create_dir_all(folder)?;
+    let mut file = NamedTempFile::new_in(folder)?;
+    write(&mut file)?;
+    file.persist(path)?;
+    Ok(())
+}
+
 /// Finds out, without leaving anything behind, whether `path` could be written.
 pub(crate) fn check_writable(path: &Path) -> Result<()> {
     let target = resolve(path)?;
@@ -72,6 +86,27 @@ fn resolve(path: &Path) -> Result<PathBuf> {
             .help("make it writable or choose another name"));
     }
     fs::canonicalize(path).map_err(|e| Error::system("write", path, &e))
+}
+
+/// Fills `bytes` with what a file holds from a place on.
+#[cfg(unix)]
+pub(crate) fn read_at(file: &File, at: u64, bytes: &mut [u8]) -> std::io::Result<()> {
+    std::os::unix::fs::FileExt::read_exact_at(file, bytes, at)
+}
+
+/// Fills `bytes` with what a file holds from a place on.
+#[cfg(windows)]
+pub(crate) fn read_at(file: &File, mut at: u64, mut bytes: &mut [u8]) -> std::io::Result<()> {
+    while !bytes.is_empty() {
+        match std::os::windows::fs::FileExt::seek_read(file, bytes, at)? {
+            0 => return Err(std::io::ErrorKind::UnexpectedEof.into()),
+            count => {
+                at += count as u64;
+                bytes = &mut bytes[count..];
+            }
+        }
+    }
+    Ok(())
 }
 
 fn folder_of(path: &Path) -> &Path {

@@ -8,6 +8,7 @@
 //! with the turned faces; `face_normals` drops the vertex normals ([`Mesh::drop_normals`]);
 //! `flip_normals` turns geometric and vertex normals over ([`Mesh::flip_normals`]).
 
+mod cache;
 mod displace;
 mod generate;
 mod gltf;

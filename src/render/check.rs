@@ -47,7 +47,7 @@ impl Task for Check<'_> {
             warnings.extend(view.into_iter().flat_map(|view| view.warnings));
         }
         let limit = self.options.memory_limit;
-        match problems.take(prepare::load(description, None, limit, self.progress)) {
+        match problems.take(prepare::load(description, None, None, limit, self.progress)) {
             Some(assets) => {
                 warnings.extend_from_slice(assets.warnings());
                 problems.take(scene::build(description, &assets, color, Method::Brute));

@@ -3,6 +3,7 @@
 //! the next render, which may be of another view or frame.
 
 use std::any::Any;
+use std::path::Path;
 use std::sync::OnceLock;
 
 use super::fingerprint::{self, Fingerprint};
@@ -166,17 +167,18 @@ pub(super) fn view<C: ColorModel>(description: &Description, sensor: NodeId) -> 
     })
 }
 
-/// Loads the shapes but for the mesh that is `given`, and displaces those that want it as far as the `limit` on bytes
+/// Loads the shapes but for the mesh that is `given`, with the folder `cache`, and displaces those that want it as far as the `limit` on bytes
 /// allows.
 pub(super) fn load(
     description: &Description,
     given: Option<ReadMesh>,
+    cache: Option<&Path>,
     limit: Option<u64>,
     progress: &dyn Progress,
 ) -> Result<Assets> {
     let shapes = description.root().children(Kind::Shape).len();
     progress.begin(Phase::Load, shapes as u64);
-    let mut assets = Assets::load(description, given, &|| progress.advance(1, 0))?;
+    let mut assets = Assets::load(description, given, cache, &|| progress.advance(1, 0))?;
     assets.displace(description, limit.map(memory::triangles))?;
     Ok(assets)
 }
@@ -220,7 +222,7 @@ fn make<C: ColorModel>(
     announced.check(options.memory_limit)?;
     let assets = timed(&mut seconds.load, || {
         let limit = options.memory_limit.map(|limit| limit.saturating_sub(film));
-        load(description, given, limit, progress)
+        load(description, given, options.cache.as_deref(), limit, progress)
     })
     .map_err(|error| {
         // What is wrong with materials is told along with what is wrong with shapes.

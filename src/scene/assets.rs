@@ -7,6 +7,7 @@
 //! The graph is flattened here: a shape is loaded for each path that leads to it, in world space.
 
 use std::collections::HashMap;
+use std::path::Path;
 use std::sync::Arc;
 
 use glam::DMat4;
@@ -17,7 +18,7 @@ use crate::description::{Description, Kind, NodeId, Properties};
 use crate::error::{Error, Problem, Problems, Result};
 use crate::math::Transform;
 use crate::mesh::ReadMesh;
-use crate::shape::{self, Geometry};
+use crate::shape::{self, Geometry, Setting};
 
 /// The geometry of a scene, loaded: it does not depend on colour, sensor or film.
 #[derive(Debug)]
@@ -42,10 +43,12 @@ pub(super) struct Member {
 
 impl Assets {
     /// Loads the shapes of a scene, several at once; `loaded` is called after each that stands in the
-    /// scene itself. The mesh that is `given` is not read again.
+    /// scene itself. The mesh that is `given` is not read again, and what takes long to compute is kept in the folder
+    /// `cache`.
     pub fn load(
         description: &Description,
         given: Option<ReadMesh>,
+        cache: Option<&Path>,
         loaded: &(impl Fn() + Sync),
     ) -> Result<Self> {
         let mut plan = Plan::default();
@@ -65,7 +68,10 @@ impl Assets {
         } = plan;
         let sites = shapes.iter().map(|planned| Site {
             properties: &planned.properties,
-            outer: &planned.space.outer,
+            setting: Setting {
+                outer: planned.space.outer,
+                cache,
+            },
         });
         let sites: Vec<Site<'_>> = sites.collect();
         let results = files::build(&sites, given, &|place| {
@@ -279,8 +285,6 @@ impl Space<'_> {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
     use super::*;
     use crate::description::Options;
 
@@ -294,7 +298,7 @@ mod tests {
     fn load_in_part(text: &str) -> Result<(Assets, Vec<Problem>)> {
         let text = format!(r#"<scene version="3.0.0">{text}</scene>"#);
         let scene = Description::parse(&text, Path::new("test.xml"), &Options::default())?;
-        let assets = Assets::load(&scene, None, &|| ())?;
+        let assets = Assets::load(&scene, None, None, &|| ())?;
         Ok((assets, scene.unread()))
     }
 

@@ -298,7 +298,7 @@ mod tests {
             <texture name="reflectance" type="mesh_attribute"><string name="name" value="face_color"/></texture>
             </bsdf></bsdf></shape></scene>"#;
         let scene = Description::parse(text, Path::new("test.xml"), &Options::default()).unwrap();
-        let assets = Assets::load(&scene, None, &|| ()).unwrap();
+        let assets = Assets::load(&scene, None, None, &|| ()).unwrap();
         let error = build(&scene, &assets, Rgb, Method::Tree)
             .unwrap_err()
             .to_string();
@@ -320,7 +320,7 @@ mod tests {
         let scene = Description::parse(&text, Path::new("test.xml"), &Options::default()).unwrap();
         let names = light_names(&scene);
         assert_eq!(names, ["first", "nested", "2", "after", "last"]);
-        let assets = Assets::load(&scene, None, &|| ()).unwrap();
+        let assets = Assets::load(&scene, None, None, &|| ()).unwrap();
         let built = build(&scene, &assets, Rgb, Method::Tree).unwrap();
         assert_eq!(built.lights().len(), names.len());
     }

@@ -193,7 +193,7 @@ mod tests {
             ..Options::default()
         };
         let scene = Description::parse(&text, &folder.join("test.xml"), &options)?;
-        let mut assets = Assets::load(&scene, None, &|| ())?;
+        let mut assets = Assets::load(&scene, None, None, &|| ())?;
         assets.displace(&scene, Some(1_000_000))?;
         crate::scene::build(
             &scene,

@@ -3,20 +3,18 @@
 
 use std::collections::HashMap;
 
-use glam::DMat4;
 use rayon::prelude::*;
 
 use crate::description::Properties;
 use crate::error::Result;
 use crate::mesh::{Loaded, MeshFile, ReadMesh, read};
-use crate::shape::{self, Shape};
+use crate::shape::{self, Setting, Shape};
 
 /// A shape that is to be built.
 #[derive(Clone, Copy)]
 pub(super) struct Site<'a> {
     pub(super) properties: &'a Properties<'a>,
-    /// From the space in which it stands to the world's.
-    pub(super) outer: &'a DMat4,
+    pub(super) setting: Setting<'a>,
 }
 
 /// Shapes that share a file, or one that needs none.
@@ -88,14 +86,20 @@ impl Task {
         let Some(loaded) = loaded else {
             // Nobody to share with, or nothing to share: each says what is wrong with the file in its own place.
             let build = |&site: &usize| {
-                let Site { properties, outer } = sites[site];
-                done(site, shape::build_within(outer, properties))
+                let Site {
+                    properties,
+                    setting,
+                } = &sites[site];
+                done(site, shape::build_within(setting, properties))
             };
             return self.sites.par_iter().map(build).collect();
         };
         let place = |site: usize, loaded: Loaded| {
-            let Site { properties, outer } = sites[site];
-            done(site, shape::build_from(loaded, outer, properties))
+            let Site {
+                properties,
+                setting,
+            } = &sites[site];
+            done(site, shape::build_from(loaded, setting, properties))
         };
         let (last, others) = self.sites.split_last().expect("a task has sites");
         let others = others.par_iter().map(|&site| place(site, loaded.clone()));
@@ -135,7 +139,7 @@ mod tests {
         let shapes = scene.root().children(Kind::Shape);
         let site = |properties| Site {
             properties,
-            outer: &DMat4::IDENTITY,
+            setting: Setting::default(),
         };
         let sites: Vec<Site<'_>> = shapes.iter().map(site).collect();
         let count = AtomicUsize::new(0);

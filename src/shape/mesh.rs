@@ -7,7 +7,7 @@ use glam::{DMat4, Vec2, Vec3};
 
 use super::quad::{Place, Quad};
 use super::{
-    Bounds, Chart, Geometry, Shape, Surface, SurfaceSample, area_to_solid_angle, to_world,
+    Bounds, Chart, Geometry, Setting, Shape, Surface, SurfaceSample, area_to_solid_angle, to_world,
 };
 use crate::description::Properties;
 use crate::error::Result;
@@ -242,9 +242,22 @@ impl Surface for TriangleMesh {
 }
 
 /// Puts a mesh into the world as its shape says: `to_world`, `face_normals`, `flip_normals`.
-pub(super) fn place(mut mesh: Mesh, properties: &Properties<'_>, outer: &DMat4) -> Result<Shape> {
-    let to_world = to_world(properties, outer)?;
+pub(super) fn place(mesh: Mesh, properties: &Properties<'_>, outer: &DMat4) -> Result<Shape> {
+    let setting = Setting {
+        outer: *outer,
+        cache: None,
+    };
+    place_in(&setting, mesh, properties)
+}
+
+fn place_in(
+    setting: &Setting<'_>,
+    mut mesh: Mesh,
+    properties: &Properties<'_>,
+) -> Result<Shape> {
+    let to_world = to_world(properties, &setting.outer)?;
     let mut dropped = 0;
+    let mut uncached = None;
     if to_world != DMat4::IDENTITY {
         mesh.transform(&to_world);
         // A transform can carry finite corners to infinity.
@@ -253,12 +266,18 @@ pub(super) fn place(mut mesh: Mesh, properties: &Properties<'_>, outer: &DMat4) 
     if properties.boolean("face_normals")?.unwrap_or(false) {
         mesh.drop_normals();
     } else if mesh.normals.is_empty() {
-        mesh.compute_normals();
+        match setting.cache {
+            Some(folder) => uncached = mesh.compute_normals_once(folder),
+            None => mesh.compute_normals(),
+        }
     }
     if properties.boolean("flip_normals")?.unwrap_or(false) {
         mesh.flip_normals();
     }
     let mut shape = Shape::from(Geometry::Mesh(TriangleMesh::new(mesh)));
+    if let Some(problem) = uncached {
+        shape.warnings.extend_from_slice(problem.problems());
+    }
     if dropped > 0 {
         let message = format!(
             "{dropped} triangles were dropped, for to_world carries them out of all bounds"
@@ -292,9 +311,9 @@ pub(super) fn file(properties: &Properties<'_>, options: ReadOptions) -> Result<
 pub(super) fn place_file(
     loaded: Loaded,
     properties: &Properties<'_>,
-    outer: &DMat4,
+    setting: &Setting<'_>,
 ) -> Result<Shape> {
-    let mut shape = place(loaded.mesh, properties, outer)?;
+    let mut shape = place_in(setting, loaded.mesh, properties)?;
     shape.warnings.splice(0..0, loaded.warnings);
     Ok(shape)
 }

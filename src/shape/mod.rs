@@ -21,6 +21,8 @@ mod serialized;
 mod stl;
 mod triangle;
 
+use std::path::Path;
+
 use glam::{DAffine3, DMat3, DMat4, DVec3, Vec2, Vec3};
 
 use crate::description::{Kind, Properties};
@@ -282,20 +284,29 @@ pub(crate) fn check_strict(properties: &Properties<'_>) -> Result<()> {
 
 /// Builds the shape that `properties` names.
 pub fn build(properties: &Properties<'_>) -> Result<Shape> {
-    build_within(&DMat4::IDENTITY, properties)
+    build_within(&Setting::default(), properties)
 }
 
-/// Builds the shape that `properties` names, in a space from which `outer` leads to the world's.
-pub fn build_within(outer: &DMat4, properties: &Properties<'_>) -> Result<Shape> {
+/// Where a shape is built.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Setting<'a> {
+    /// From the space in which it stands to the world's.
+    pub outer: DMat4,
+    /// A folder for what takes long to compute of a large mesh.
+    pub cache: Option<&'a Path>,
+}
+
+/// Builds the shape that `properties` names, as it stands in its setting.
+pub fn build_within(setting: &Setting<'_>, properties: &Properties<'_>) -> Result<Shape> {
     debug_assert_eq!(properties.kind(), Kind::Shape);
     check_strict(properties)?;
     match plugin(properties) {
-        Some(Build::Made(build)) => build(properties, outer),
+        Some(Build::Made(build)) => build(properties, &setting.outer),
         Some(Build::Read(options)) => {
             let file = mesh::file(properties, options(properties)?)?;
             let loaded = read(&file.path, &file.options);
             let loaded = loaded.map_err(|e| e.named_at(properties.location()))?;
-            mesh::place_file(loaded, properties, outer)
+            mesh::place_file(loaded, properties, setting)
         }
         None => Err(family::unknown(
             properties,
@@ -315,9 +326,13 @@ pub fn mesh_file(properties: &Properties<'_>) -> Option<MeshFile> {
 }
 
 /// As [`build_within`], with the [`mesh_file`] read already.
-pub fn build_from(loaded: Loaded, outer: &DMat4, properties: &Properties<'_>) -> Result<Shape> {
+pub fn build_from(
+    loaded: Loaded,
+    setting: &Setting<'_>,
+    properties: &Properties<'_>,
+) -> Result<Shape> {
     check_strict(properties)?;
-    mesh::place_file(loaded, properties, outer)
+    mesh::place_file(loaded, properties, setting)
 }
 
 /// The property `to_world`, the identity by default, and then `outer`.

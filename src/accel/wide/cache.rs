@@ -6,17 +6,18 @@
 //! [a tree](super::sound), and nodes are looked at only after they have been copied: whatever a file holds, and whoever
 //! writes to it meanwhile, no walk leaves the tree and none is without end.
 
-use std::fs::{self, File};
-use std::io::{self, ErrorKind, Write};
+use std::fs::File;
+use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
-use super::huge::{Huge, read_at};
+use super::huge::Huge;
 use super::node::{BLOCK_INDEX, Block, LEAF, Node};
 use super::{Leaves, Tree, sound};
 use crate::accel::{Build, CacheUse};
 use crate::error::Error;
+use crate::file::{leave, read_at};
 
 /// What every file begins with. The number changes with what is in the file, and whenever trees are built otherwise.
 const MAGIC: &[u8; 16] = b"etendue tree 2\n\0";
@@ -225,14 +226,10 @@ impl Entry {
         let (tree, others) = whole;
         let others: Vec<u8> = others.iter().flat_map(|o| o.to_ne_bytes()).collect();
         let content = [&head[..], tree.blocks.bytes(), tree.nodes.bytes(), &others];
-        let write = || -> io::Result<()> {
-            fs::create_dir_all(&self.folder)?;
-            let mut file = tempfile::NamedTempFile::new_in(&self.folder)?;
+        let written = leave(&path, |file| {
             content.iter().try_for_each(|bytes| file.write_all(bytes))?;
-            file.write_all(self.hash(&content).as_bytes())?;
-            file.persist(&path)?;
-            Ok(())
-        };
-        write().map_err(|error| (path, error))
+            file.write_all(self.hash(&content).as_bytes())
+        });
+        written.map_err(|error| (path, error))
     }
 }

@@ -16,6 +16,7 @@ use std::ptr::NonNull;
 use rayon::prelude::*;
 
 use super::node::{Block, Node};
+use crate::file::read_at;
 
 /// The size of a huge page; on machines with others this is only an alignment.
 const PAGE: usize = 2 << 20;
@@ -193,25 +194,4 @@ impl<T: Plain + fmt::Debug> fmt::Debug for Huge<T> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         (**self).fmt(f)
     }
-}
-
-/// Fills `bytes` with what a file holds from a place on.
-#[cfg(unix)]
-pub(super) fn read_at(file: &File, at: u64, bytes: &mut [u8]) -> io::Result<()> {
-    std::os::unix::fs::FileExt::read_exact_at(file, bytes, at)
-}
-
-/// Fills `bytes` with what a file holds from a place on.
-#[cfg(windows)]
-pub(super) fn read_at(file: &File, mut at: u64, mut bytes: &mut [u8]) -> io::Result<()> {
-    while !bytes.is_empty() {
-        match std::os::windows::fs::FileExt::seek_read(file, bytes, at)? {
-            0 => return Err(io::ErrorKind::UnexpectedEof.into()),
-            count => {
-                at += count as u64;
-                bytes = &mut bytes[count..];
-            }
-        }
-    }
-    Ok(())
 }
