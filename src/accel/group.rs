@@ -274,7 +274,7 @@ impl Leaves for Members<'_> {
             let shape = shape.then(|| self.shapes.get(run.first.shape));
             if let Some(Geometry::Mesh(mesh)) = shape {
                 hasher.update(&self.shapes.number(run.first).to_le_bytes());
-                hasher.update(mesh.mesh().triangles_hash().as_bytes());
+                hasher.update(mesh.triangles_hash().as_bytes());
                 continue;
             }
             for Bounds { min, max } in (run.start..end).map(|item| self.bounds(item)) {

@@ -21,17 +21,17 @@ const HEAD: usize = 24;
 const LARGE: usize = 1 << 16;
 
 impl Mesh {
-    /// [`Mesh::compute_normals`], unless the `folder` has them from an earlier time; there they are left. What goes
-    /// wrong with files is returned, and does no harm.
-    pub fn compute_normals_once(&mut self, folder: &Path) -> Option<Error> {
-        if self.triangles.len() < LARGE {
-            self.compute_normals();
-            return None;
-        }
-        let key = self.triangles_hash();
-        let path = folder.join(format!("{}.normals", key.to_hex()));
+    /// Whether normals are sooner read than computed.
+    pub fn is_large(&self) -> bool {
+        self.triangles.len() >= LARGE
+    }
+
+    /// [`Mesh::compute_normals`], unless the `folder` has them from an earlier time; there they are left. `hash` is
+    /// [`Mesh::triangles_hash`]. What goes wrong with files is returned, and does no harm.
+    pub fn compute_normals_once(&mut self, hash: &blake3::Hash, folder: &Path) -> Option<Error> {
+        let path = folder.join(format!("{}.normals", hash.to_hex()));
         let mut problem = None;
-        match read(&path, &key, self.positions.len()) {
+        match read(&path, hash, self.positions.len()) {
             Ok(normals) => {
                 self.normals = normals;
                 return None;
@@ -43,7 +43,7 @@ impl Mesh {
             }
         }
         self.compute_normals();
-        let written = file::leave(&path, |file| write(file, &key, &self.normals));
+        let written = file::leave(&path, |file| write(file, hash, &self.normals));
         problem.or_else(|| written.err().map(|error| Error::system("write", &path, &error)))
     }
 }
@@ -120,8 +120,13 @@ mod tests {
     fn large() -> Mesh {
         let mut mesh = sphere(400, 200);
         mesh.drop_normals();
-        assert!(mesh.triangles.len() > LARGE);
+        assert!(mesh.is_large());
         mesh
+    }
+
+    fn once(mesh: &mut Mesh, folder: &Path) -> Option<Error> {
+        let hash = mesh.triangles_hash();
+        mesh.compute_normals_once(&hash, folder)
     }
 
     fn files(folder: &Path) -> Vec<std::path::PathBuf> {
@@ -137,7 +142,7 @@ mod tests {
         computed.compute_normals();
         for _ in 0..2 {
             let mut mesh = large();
-            assert!(mesh.compute_normals_once(&kept).is_none());
+            assert!(once(&mut mesh, &kept).is_none());
             assert_eq!(mesh, computed);
         }
         assert_eq!(files(&kept).len(), 1);
@@ -146,11 +151,11 @@ mod tests {
         let key = large().triangles_hash();
         file::leave(&files(&kept)[0], |file| write(file, &key, &other)).unwrap();
         let mut mesh = large();
-        assert!(mesh.compute_normals_once(&kept).is_none());
+        assert!(once(&mut mesh, &kept).is_none());
         assert_eq!(mesh.normals, other);
         let mut moved = large();
         moved.positions[7].x += 1e-3;
-        assert!(moved.compute_normals_once(&kept).is_none());
+        assert!(once(&mut moved, &kept).is_none());
         assert_eq!(files(&kept).len(), 2);
     }
 
@@ -158,7 +163,7 @@ mod tests {
     fn a_damaged_file_is_told_and_replaced() {
         let folder = tempfile::tempdir().unwrap();
         let mut good = large();
-        assert!(good.compute_normals_once(folder.path()).is_none());
+        assert!(once(&mut good, folder.path()).is_none());
         let path = &files(folder.path())[0];
         let bytes = fs::read(path).unwrap();
         let damages: [(usize, &str); 5] = [
@@ -173,28 +178,25 @@ mod tests {
             damaged[place] ^= 4;
             fs::write(path, damaged).unwrap();
             let mut mesh = large();
-            let problem = mesh.compute_normals_once(folder.path()).unwrap().to_string();
+            let problem = once(&mut mesh, folder.path()).unwrap().to_string();
             assert!(problem.contains(what), "{problem}");
             assert_eq!(mesh, good);
             assert_eq!(fs::read(path).unwrap(), bytes);
         }
         for length in [0, HEAD, bytes.len() - 1] {
             fs::write(path, &bytes[..length]).unwrap();
-            let problem = large().compute_normals_once(folder.path()).unwrap();
+            let problem = once(&mut large(), folder.path()).unwrap();
             assert!(problem.to_string().contains("length"), "{problem}");
         }
     }
 
     #[test]
-    fn small_meshes_are_computed_and_a_folder_that_cannot_be_made_is_told() {
+    fn a_folder_that_cannot_be_made_is_told() {
         let folder = tempfile::tempdir().unwrap();
-        let mut small = sphere(8, 4);
-        assert!(small.compute_normals_once(folder.path()).is_none());
-        assert!(files(folder.path()).is_empty());
         let file = folder.path().join("file");
         fs::write(&file, "").unwrap();
         let mut mesh = large();
-        assert!(mesh.compute_normals_once(&file.join("folder")).is_some());
+        assert!(once(&mut mesh, &file.join("folder")).is_some());
         assert_eq!(mesh.normals.len(), mesh.positions.len());
     }
 }

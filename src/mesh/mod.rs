@@ -106,17 +106,21 @@ const GRAIN: usize = 1 << 14;
 impl Mesh {
     /// The least box around all triangles, as its low and high corner; `None` without triangles.
     pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
+        let union = |a: (Vec3, Vec3), b: (Vec3, Vec3)| (a.0.min(b.0), a.1.max(b.1));
         self.triangles
             .par_chunks(GRAIN)
             .map(|triangles| {
-                let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-                for i in triangles.as_flattened() {
-                    let corner = self.positions[*i as usize];
-                    (low, high) = (low.min(corner), high.max(corner));
+                // A box for each corner: none waits for another.
+                let mut boxes = [(Vec3::INFINITY, Vec3::NEG_INFINITY); 3];
+                for triangle in triangles {
+                    for (bounds, corner) in boxes.iter_mut().zip(self.corners(triangle)) {
+                        *bounds = (bounds.0.min(corner), bounds.1.max(corner));
+                    }
                 }
-                (low, high)
+                let [a, b, c] = boxes;
+                union(union(a, b), c)
             })
-            .reduce_with(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+            .reduce_with(union)
     }
 
     /// The sum of the triangles' areas, in squared scene units.

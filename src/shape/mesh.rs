@@ -24,6 +24,7 @@ pub struct TriangleMesh {
     areas: OnceLock<Option<Discrete>>,
     /// The rectangle that it is, if it is one.
     quad: Option<Quad>,
+    hash: OnceLock<blake3::Hash>,
 }
 
 impl TriangleMesh {
@@ -33,7 +34,13 @@ impl TriangleMesh {
             quad: Quad::of(&mesh),
             mesh,
             areas: OnceLock::new(),
+            hash: OnceLock::new(),
         }
+    }
+
+    /// [`Mesh::triangles_hash`], taken once.
+    pub fn triangles_hash(&self) -> &blake3::Hash {
+        self.hash.get_or_init(|| self.mesh.triangles_hash())
     }
 
     /// The triangles.
@@ -257,7 +264,7 @@ fn place_in(
 ) -> Result<Shape> {
     let to_world = to_world(properties, &setting.outer)?;
     let mut dropped = 0;
-    let mut uncached = None;
+    let (mut hash, mut uncached) = (None, None);
     if to_world != DMat4::IDENTITY {
         mesh.transform(&to_world);
         // A transform can carry finite corners to infinity.
@@ -267,14 +274,22 @@ fn place_in(
         mesh.drop_normals();
     } else if mesh.normals.is_empty() {
         match setting.cache {
-            Some(folder) => uncached = mesh.compute_normals_once(folder),
-            None => mesh.compute_normals(),
+            Some(folder) if mesh.is_large() => {
+                let hash = hash.insert(mesh.triangles_hash());
+                uncached = mesh.compute_normals_once(hash, folder);
+            }
+            _ => mesh.compute_normals(),
         }
     }
     if properties.boolean("flip_normals")?.unwrap_or(false) {
         mesh.flip_normals();
+        hash = None;
     }
-    let mut shape = Shape::from(Geometry::Mesh(TriangleMesh::new(mesh)));
+    let mesh = TriangleMesh {
+        hash: hash.map(OnceLock::from).unwrap_or_default(),
+        ..TriangleMesh::new(mesh)
+    };
+    let mut shape = Shape::from(Geometry::Mesh(mesh));
     if let Some(problem) = uncached {
         shape.warnings.extend_from_slice(problem.problems());
     }

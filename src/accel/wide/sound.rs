@@ -12,28 +12,54 @@ const GRAIN: usize = 1 << 12;
 /// Nodes on the longest way down: through the tree over all chunks, and that of one of them.
 const LONGEST: u16 = 2 * (DEEPEST as u16 + 1);
 
+/// The planes of a lane that holds nothing.
+const NOWHERE: [f32; 6] = {
+    let (low, high) = (f32::INFINITY, f32::NEG_INFINITY);
+    [low, high, low, high, low, high]
+};
+
+/// The lanes, as bits, that half of an order names.
+const LANES: [u8; 1 << 12] = {
+    let mut lanes = [0; 1 << 12];
+    let mut order = 0;
+    while order < lanes.len() {
+        let mut place = 0;
+        while place < 12 {
+            lanes[order] |= 1 << (order >> place & 7);
+            place += 3;
+        }
+        order += 1;
+    }
+    lanes
+};
+
 /// How many nodes are on the longest way down, if these are a tree: its root first, every other node behind the one
 /// above it.
 pub(super) fn levels(nodes: &[Node], blocks: usize, others: usize) -> Option<usize> {
     let is_whole = |place: usize, node: &Node| {
-        let mut lanes = (0..WIDTH).map(|lane| (node.children[lane], node.slabs.map(|s| s[lane])));
-        let child = |(name, slabs): (u32, [f32; 6])| match name {
-            DONE => slabs == [[f32::INFINITY, f32::NEG_INFINITY]; 3].as_flattened(),
-            _ => {
-                let is_there = match name {
-                    0..LEAF => (name as usize) > place && (name as usize) < nodes.len(),
-                    LEAF..OTHER => ((name & BLOCK_INDEX) as usize) < blocks,
-                    OTHER.. => ((name & OTHER_INDEX) as usize) < others,
-                };
-                is_there && slabs.iter().all(|plane| plane.is_finite())
+        // All lanes at once, without a branch.
+        let (mut finite, mut nowhere) = ([true; WIDTH], [true; WIDTH]);
+        for (plane, none) in node.slabs.iter().zip(NOWHERE) {
+            for lane in 0..WIDTH {
+                finite[lane] &= plane[lane].is_finite();
+                nowhere[lane] &= plane[lane] == none;
             }
+        }
+        let is_there = |name: u32| match name {
+            0..LEAF => (name as usize) > place && (name as usize) < nodes.len(),
+            LEAF..OTHER => ((name & BLOCK_INDEX) as usize) < blocks,
+            OTHER.. => ((name & OTHER_INDEX) as usize) < others,
+        };
+        let child = |lane: usize| match node.children[lane] {
+            DONE => nowhere[lane],
+            name => finite[lane] && is_there(name),
         };
         // Each lane is looked at once.
         let all = |order: &u32| {
-            let lanes = (0..WIDTH).fold(0_u32, |seen, i| seen | 1 << (order >> (3 * i) & 7));
-            lanes == (1 << WIDTH) - 1 && order >> (3 * WIDTH) == 0
+            let [first, last] = [order & 0xfff, order >> 12].map(|half| LANES.get(half as usize));
+            first.zip(last).is_some_and(|(a, b)| a | b == u8::MAX)
         };
-        lanes.all(child) && node.order.iter().all(all)
+        (0..WIDTH).all(child) && node.order.iter().all(all)
     };
     let all = nodes.par_iter().enumerate().with_min_len(GRAIN);
     if !all.all(|(place, node)| is_whole(place, node)) {
@@ -75,8 +101,12 @@ pub(super) fn are_of(blocks: &[Block], others: &[u32], leaves: &impl Leaves) -> 
         u32::MAX => (block.corners.as_flattened().iter()).all(|corner| corner[lane].is_nan()),
         number => is_triangle(number),
     };
+    let is_sound = |block: &Block| {
+        (block.ids.iter()).fold(true, |all, id| all & largest.contains(id))
+            || (0..BLOCK).all(|lane| lane_is_sound(block, lane))
+    };
     let blocks = blocks.par_iter().with_min_len(GRAIN);
     let is_other = |item: &u32| *item < leaves.count() && !leaves.is_triangle(*item);
-    blocks.all(|block| (0..BLOCK).all(|lane| lane_is_sound(block, lane)))
+    blocks.all(is_sound)
         && others.iter().all(is_other)
 }
