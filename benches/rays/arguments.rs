@@ -27,7 +27,7 @@ pub(crate) struct Arguments {
     #[arg(long)]
     pub(crate) once: bool,
 
-    /// Of the others only these, by their names in the report; e.g. `Embree`
+    /// Of the others only these, by their names in the report, e.g. `Embree`; or `none`
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     beside: Vec<String>,
 
@@ -48,6 +48,18 @@ impl Arguments {
         }
         let quick = |name: &Named| !(self.quick && *name == Named::Terrain);
         Named::ALL.into_iter().filter(quick).collect()
+    }
+
+    /// That only these names, those of tracers, are asked for.
+    pub(crate) fn check(&self, names: &[&str]) -> Result<(), String> {
+        let known = |name: &str| name == "none" || names.contains(&name);
+        match self.beside.iter().find(|name| !known(name)) {
+            Some(name) => Err(format!(
+                "there is no tracer {name:?}; there are {}, and none",
+                names.join(", ")
+            )),
+            None => Ok(()),
+        }
     }
 
     /// Whether a tracer of this name is measured.

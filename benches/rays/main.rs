@@ -3,7 +3,7 @@
 //!     cargo bench --bench rays                                       # everything that is there
 //!     EMBREE_LIB=$(tools/embree) cargo bench --bench rays            # with Embree
 //!     cargo bench --bench rays -- bunny dragon --repeat 9            # only these, more rounds
-//!     cargo bench --bench rays -- crown --once --beside Embree       # only these two
+//!     cargo bench --bench rays -- crown --once --beside Embree       # Embree and its packets alone
 //!     cargo bench --bench rays -- --quick --json target/rays.json    # fewer rays, no terrain
 //!
 //! The tracers take turns in each round, each with one thread and with two, so that what disturbs the machine
@@ -50,12 +50,14 @@ fn run(arguments: &Arguments) -> Result<(), String> {
     if embree.is_none() {
         println!("EMBREE_LIB is not set: without Embree (tools/embree fetches it)");
     }
-    let makers: Vec<Maker> = ours::makers()
+    let mut makers: Vec<Maker> = ours::makers()
         .into_iter()
         .chain(obvhs::makers())
         .chain(embree.iter().flat_map(embree::makers))
-        .filter(|maker| arguments.wants(maker.name))
         .collect();
+    let names: Vec<&str> = makers.iter().map(|maker| maker.name).collect();
+    arguments.check(&names)?;
+    makers.retain(|maker| arguments.wants(maker.name));
     let mut report = Report::default();
     for name in arguments.meshes() {
         if name == Named::Watertight {

@@ -145,7 +145,12 @@ impl<'t> Lines<'t> {
     pub(super) fn at(&self, offset: usize) -> Location {
         let offset = offset.min(self.text.len());
         let line = self.starts.partition_point(|&start| start <= offset);
-        let column = self.characters_before(offset) - self.characters_before(self.starts[line - 1]);
+        let start = self.starts[line - 1];
+        let column = if offset - start <= Self::BLOCK {
+            count_characters(&self.text[start..offset])
+        } else {
+            self.characters_before(offset) - self.characters_before(start)
+        };
         Location {
             file: self.file.clone(),
             line: u32::try_from(line).unwrap_or(u32::MAX),

@@ -98,7 +98,7 @@ impl Fingerprint {
 /// The hash of all files that the scene names: it takes the time to read them.
 pub(super) fn contents(description: &Description) -> Result<String> {
     let mut hasher = Hasher::new();
-    for path in description.canonical(Part::Scene).files {
+    for path in description.files(Part::Scene) {
         hash_file(&mut hasher, &path)?;
     }
     Ok(hex(&hasher))

@@ -81,7 +81,7 @@ impl Session {
         };
         let bounds = contents.bounds;
         let corners = [bounds.min, bounds.max].map(|corner| corner.to_array());
-        let mut files = description.canonical(Part::Scene).files;
+        let mut files = description.files(Part::Scene);
         files.sort();
         files.dedup();
         let file = |path: PathBuf| NamedFile {

@@ -6,7 +6,7 @@ use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
 use super::blocks::Grid;
-use crate::description::{Canonical, Description, Part};
+use crate::description::{Description, Part};
 use crate::error::{Error, Result};
 use crate::mesh;
 use crate::sensor::Film;
@@ -69,7 +69,7 @@ pub(super) fn triangles(bytes: u64) -> u64 {
 impl Estimate {
     /// By what the scene's files announce; the film's share is left out.
     pub(super) fn of_files(description: &Description) -> Self {
-        let Canonical { mut files, .. } = description.canonical(Part::Scene);
+        let mut files = description.files(Part::Scene);
         files.sort();
         files.dedup();
         let mut estimate = Self::default();

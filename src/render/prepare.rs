@@ -237,7 +237,8 @@ fn make<C: ColorModel>(
         assets: assets.bytes() as u64,
         trees: match options.method {
             Method::Brute | Method::Exhaustive => 0,
-            Method::Tree => memory::trees(primitives),
+            // An instance stands in the world's tree like a primitive.
+            Method::Tree => memory::trees(primitives + assets.instance_count()),
         },
     };
     loaded.check(options.memory_limit)?;

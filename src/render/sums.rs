@@ -5,6 +5,7 @@
 //! pixel 0.40× (tent) or 0.30× (gaussian) of the variance that counting each sample once would. Where
 //! the film ends the filter is cut off, and the division by the sum of weights makes up for it.
 
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::color::luminance;
@@ -21,6 +22,9 @@ pub(super) fn border(filter: &Filter) -> u32 {
 
 /// The most pixels along an axis that a sample reaches, as a multiple of four.
 const MAX_REACH: usize = (2 * (MAX_RADIUS as usize + 1) + 1).next_multiple_of(4);
+
+/// Pixels that one task develops.
+const GRAIN: usize = 1 << 13;
 
 /// Seconds of threads that estimate samples, by what they do.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
@@ -247,18 +251,25 @@ impl Sums {
         });
         names.extend_from_slice(extra);
         let stride = self.channels.len() + 1;
-        let mut data = Vec::with_capacity(self.data.len() / stride * names.len());
-        for pixel in self.data.chunks_exact(stride) {
+        let mut data = vec![0.0; self.data.len() / stride * names.len()];
+        let pixels = data.par_chunks_exact_mut(names.len());
+        let pixels = pixels.zip(self.data.par_chunks_exact(stride));
+        pixels.with_min_len(GRAIN).for_each(|(out, pixel)| {
             let scale = if pixel[0] > 0.0 { 1.0 / pixel[0] } else { 0.0 };
             let value = |c: usize| (pixel[c + 1] * scale) as f32;
             let rgb = [value(0), value(1), value(2)];
+            let (main, others) = out.split_at_mut(names.len() - extra.len());
             match film.pixel_format {
-                PixelFormat::Luminance => data.push(luminance(rgb)),
-                PixelFormat::Rgb => data.extend(rgb),
-                PixelFormat::Rgba => data.extend([rgb[0], rgb[1], rgb[2], value(colors)]),
+                PixelFormat::Luminance => main[0] = luminance(rgb),
+                PixelFormat::Rgb => main.copy_from_slice(&rgb),
+                PixelFormat::Rgba => {
+                    main.copy_from_slice(&[rgb[0], rgb[1], rgb[2], value(colors)]);
+                }
             }
-            data.extend((3..colors).map(value));
-        }
+            for (other, c) in others.iter_mut().zip(3..) {
+                *other = value(c);
+            }
+        });
         Image::from_data(self.window.width, self.window.height, names, data)
     }
 }

@@ -111,9 +111,15 @@ impl Assets {
         self.shapes.iter().map(count).sum()
     }
 
+    /// How many instances there are.
+    pub fn instance_count(&self) -> u64 {
+        self.instances.len() as u64
+    }
+
     /// Bytes held.
     pub fn bytes(&self) -> usize {
-        self.shapes.iter().map(|s| s.geometry.bytes()).sum()
+        let shapes: usize = self.shapes.iter().map(|s| s.geometry.bytes()).sum();
+        shapes + self.instances.len() * size_of::<Instance>()
     }
 }
 

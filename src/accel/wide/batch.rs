@@ -14,7 +14,7 @@ use super::kernel::{Ends, FILED, Lanes};
 use super::node::{
     BLOCK, BLOCK_INDEX, DONE, EXIT, Entry, LEAF, LEAVE, OTHER, OTHER_INDEX, WIDTH, triangles_of,
 };
-use super::state::{Best, Flight, State};
+use super::state::{Best, Flight, Start, State};
 use super::{Met, Tree, Walker};
 use crate::accel::Counts;
 use crate::accel::triangle::Shear;
@@ -143,9 +143,8 @@ impl Stacks {
             if ray.current == LEAVE {
                 found::<W, ANY>(walker, ray);
                 let start = walker.start(ray.ray as usize);
-                ray.enter(tree, &start);
                 // SAFETY: the caller has what `L` needs.
-                unsafe { L::aim(&start.ray, ray) };
+                unsafe { enter::<L>(ray, tree, &start) };
             } else {
                 // SAFETY: what the ray is at was taken from its top.
                 let entry = unsafe { *self.start.add(ray.top as usize) };
@@ -167,8 +166,7 @@ impl Stacks {
                         unsafe {
                             *self.start.add(ray.top as usize) = EXIT;
                             ray.top += 1;
-                            ray.enter(inner, &start);
-                            L::aim(&start.ray, ray);
+                            enter::<L>(ray, inner, &start);
                         }
                         return;
                     }
@@ -218,6 +216,34 @@ fn found<'t, W: Walker<'t>, const ANY: bool>(walker: &mut W, ray: &State) {
     walker.found(ray.ray as usize, ray.instance, best, uv);
 }
 
+/// Begins with a ray at the tree's root; `bottom` is its stack's.
+///
+/// # Safety
+/// The processor has the instructions of `L`.
+#[inline(always)]
+unsafe fn begin<'t, L: Lanes, W: Walker<'t>>(
+    walker: &W,
+    index: usize,
+    ray: &mut State,
+    tree: &'t Tree,
+    bottom: u32,
+) {
+    ray.begin(index as u32, bottom);
+    // SAFETY: the caller's word.
+    unsafe { enter::<L>(ray, tree, &walker.start(index)) };
+}
+
+/// Puts a ray at a tree's root, and aims it.
+///
+/// # Safety
+/// The processor has the instructions of `L`.
+#[inline(always)]
+unsafe fn enter<L: Lanes>(ray: &mut State, tree: &Tree, start: &Start) {
+    ray.enter(tree, start);
+    // SAFETY: the caller's word.
+    unsafe { L::aim(&start.ray, ray) };
+}
+
 /// Walks `count` rays.
 ///
 /// # Safety
@@ -246,10 +272,8 @@ pub(super) unsafe fn batch<'t, L: Lanes, W: Walker<'t>, const ANY: bool, const F
     let bottoms: [u32; IN_FLIGHT] = std::array::from_fn(|slot| flight.bottom(slot));
     let states = flight.states.as_mut_ptr();
     for (slot, state) in flight.states.iter_mut().enumerate().take(slots) {
-        let start = walker.start(slot);
-        state.begin(slot as u32, tree, &start, bottoms[slot]);
         // SAFETY: the caller has what `L` needs.
-        unsafe { L::aim(&start.ray, state) };
+        unsafe { begin::<L, W>(walker, slot, state, tree, bottoms[slot]) };
         lists.nodes[0][slot] = slot as u32;
     }
     let (mut next, mut node_count, mut leaf_count) = (slots, slots, 0);
@@ -320,10 +344,7 @@ pub(super) unsafe fn batch<'t, L: Lanes, W: Walker<'t>, const ANY: bool, const F
                     if next == count {
                         continue;
                     }
-                    let bottom = bottoms[slot as usize];
-                    let start = walker.start(next);
-                    ray.begin(next as u32, tree, &start, bottom);
-                    L::aim(&start.ray, ray);
+                    begin::<L, W>(walker, next, ray, tree, bottoms[slot as usize]);
                     next += 1;
                 }
                 *rest.add(ready) = slot;

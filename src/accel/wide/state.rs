@@ -153,10 +153,9 @@ impl State {
         ray: 0,
     };
 
-    /// Begins with a ray at a tree's root; `bottom` is its stack's. What remains is to aim.
+    /// Begins with a ray; `bottom` is its stack's. What remains is to enter a tree.
     #[inline(always)]
-    pub(super) fn begin(&mut self, ray: u32, tree: &Tree, start: &Start, bottom: u32) {
-        self.enter(tree, start);
+    pub(super) fn begin(&mut self, ray: u32, bottom: u32) {
         self.top = bottom + SENTINELS as u32;
         self.ray = ray;
     }

@@ -45,7 +45,8 @@ fn ray<L: Lanes>(i: u32) -> State {
         },
     };
     let mut state = State::IDLE;
-    state.begin(0, &Tree::default(), &start, 0);
+    state.begin(0, 0);
+    state.enter(&Tree::default(), &start);
     // SAFETY: the caller has what the kernel needs.
     unsafe { L::aim(&start.ray, &mut state) };
     state.lanes = random::bits(5, i) as u8 & 15;
