@@ -119,8 +119,8 @@ pub(super) struct Arguments {
     /// triangles and the rays to be expected. The image is the same
     #[arg(long, value_enum, value_name = "WORK", help_heading = RUN)]
     build: Option<Work>,
-    /// Keep trees in this folder, 60 to 75 bytes a triangle, and read from there what was built before for the same
-    /// triangles. Each is checked; the image is the same
+    /// Keep trees (60 to 75 bytes a triangle) and the normals of large meshes (12 bytes a vertex) in this folder, and
+    /// read from there what was made before for the same triangles. Each is checked; the image is the same
     #[arg(long, value_name = "DIR", help_heading = RUN)]
     cache: Option<PathBuf>,
 

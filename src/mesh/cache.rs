@@ -38,13 +38,20 @@ impl Mesh {
             }
             Err(error) if error.kind() == ErrorKind::NotFound => {}
             Err(error) => {
-                let message = format!("the normals in {} are computed anew: {error}", path.display());
+                let message = format!(
+                    "the normals in {} are computed anew: {error}",
+                    path.display()
+                );
                 problem = Some(Error::input(message));
             }
         }
         self.compute_normals();
         let written = file::leave(&path, |file| write(file, hash, &self.normals));
-        problem.or_else(|| written.err().map(|error| Error::system("write", &path, &error)))
+        problem.or_else(|| {
+            written
+                .err()
+                .map(|error| Error::system("write", &path, &error))
+        })
     }
 }
 

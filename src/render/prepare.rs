@@ -167,8 +167,8 @@ pub(super) fn view<C: ColorModel>(description: &Description, sensor: NodeId) -> 
     })
 }
 
-/// Loads the shapes but for the mesh that is `given`, with the folder `cache`, and displaces those that want it as far as the `limit` on bytes
-/// allows.
+/// Loads the shapes but for the mesh that is `given`, with the folder `cache` for what takes long, and displaces those
+/// that want it as far as the `limit` on bytes allows.
 pub(super) fn load(
     description: &Description,
     given: Option<ReadMesh>,
@@ -222,7 +222,13 @@ fn make<C: ColorModel>(
     announced.check(options.memory_limit)?;
     let assets = timed(&mut seconds.load, || {
         let limit = options.memory_limit.map(|limit| limit.saturating_sub(film));
-        load(description, given, options.cache.as_deref(), limit, progress)
+        load(
+            description,
+            given,
+            options.cache.as_deref(),
+            limit,
+            progress,
+        )
     })
     .map_err(|error| {
         // What is wrong with materials is told along with what is wrong with shapes.

@@ -103,7 +103,8 @@ pub const MAX_SAMPLES: u32 = 1 << 30;
 /// A key of its own for each set and dimension, and the point's index in its set of `n`.
 #[inline]
 fn place(key: u64, index: u32, n: u32, dimension: u32) -> (u64, u32) {
-    let set = index / n;
+    // Most samplers' only set is the first: a branch is sooner decided than a division is done.
+    let set = if index < n { 0 } else { index / n };
     (
         random::bits(random::bits(key, dimension), set),
         index - set * n,

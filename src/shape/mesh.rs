@@ -257,11 +257,7 @@ pub(super) fn place(mesh: Mesh, properties: &Properties<'_>, outer: &DMat4) -> R
     place_in(&setting, mesh, properties)
 }
 
-fn place_in(
-    setting: &Setting<'_>,
-    mut mesh: Mesh,
-    properties: &Properties<'_>,
-) -> Result<Shape> {
+fn place_in(setting: &Setting<'_>, mut mesh: Mesh, properties: &Properties<'_>) -> Result<Shape> {
     let to_world = to_world(properties, &setting.outer)?;
     let mut dropped = 0;
     let (mut hash, mut uncached) = (None, None);

@@ -149,7 +149,9 @@ fn every_surface_is_met_where_it_is_drawn_with_the_same_normal_uv_and_density() 
                 seen += 1;
                 assert!(at.position.distance(ray.at(at.t)) < 1e-4 * scale, "{text}");
                 assert!(at.normal.dot(sample.normal) > 0.999, "{text}");
-                assert!((at.uv - geometry.uv(&sample)).abs().max_element() < 0.01 || at.uv.x < 0.01);
+                assert!(
+                    (at.uv - geometry.uv(&sample)).abs().max_element() < 0.01 || at.uv.x < 0.01
+                );
                 assert!(at.uv.cmpge(Vec2::ZERO).all() && at.uv.cmple(Vec2::ONE).all());
                 if at.wi.z.abs() > 0.05 {
                     let ratio = geometry.pdf(from, &at) / sample.pdf;

@@ -144,7 +144,7 @@ fn equation(p: DVec3, inverse_square: bool) -> Option<[f64; 3]> {
 /// Radiance along rays from the eye through points of the plane z = 0.
 fn seen(text: &str, targets: &[DVec3]) -> Vec<[f32; 3]> {
     let description = describe(text);
-    let assets = Assets::load(&description, None, &|| ()).unwrap();
+    let assets = Assets::load(&description, None, None, &|| ()).unwrap();
     let built = scene::build(&description, &assets, Rgb, Method::Tree).unwrap();
     let child = |parent: &Properties<'_>, kind| parent.children(kind)[0].node_id();
     let root = description.root();

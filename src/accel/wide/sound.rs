@@ -107,6 +107,5 @@ pub(super) fn are_of(blocks: &[Block], others: &[u32], leaves: &impl Leaves) -> 
     };
     let blocks = blocks.par_iter().with_min_len(GRAIN);
     let is_other = |item: &u32| *item < leaves.count() && !leaves.is_triangle(*item);
-    blocks.all(is_sound)
-        && others.iter().all(is_other)
+    blocks.all(is_sound) && others.iter().all(is_other)
 }
