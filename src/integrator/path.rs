@@ -243,7 +243,8 @@ impl<C: ColorModel> Estimator<C> for Path {
             })
             .collect();
         let (mut rays, mut hits) = (Vec::new(), Vec::new());
-        let (mut shadows, mut blocked): (Vec<Shadow<C::Sample>>, _) = (Vec::new(), Vec::new());
+        let mut shadows: Vec<Shadow<C::Sample>> = Vec::with_capacity(starts.len());
+        let mut blocked = Vec::new();
         for depth in 0.. {
             if walkers.is_empty() {
                 break;

@@ -62,6 +62,9 @@ impl PointSet for Stratified {
     fn get_2d(&self, key: u64, index: u32, dimension: u32) -> Vec2 {
         let n = self.set_size();
         let (key, index) = place(key, index, n, dimension);
+        if n == 1 {
+            return offset(key, 0, self.jitter);
+        }
         let stratum = random::permute(index, n, key);
         let cell = Vec2::new((stratum % self.side) as f32, (stratum / self.side) as f32);
         let within = offset(key, stratum, self.jitter);
@@ -73,6 +76,9 @@ impl PointSet for Stratified {
 #[inline]
 pub(super) fn jittered(key: u64, index: u32, dimension: u32, n: u32, jitter: bool) -> f32 {
     let (key, index) = place(key, index, n, dimension);
+    if n == 1 {
+        return offset(key, 0, jitter).x;
+    }
     let stratum = random::permute(index, n, key);
     ((stratum as f32 + offset(key, stratum, jitter).x) / n as f32).min(below_one())
 }
