@@ -9,7 +9,7 @@ use std::path::Path;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::{GRAIN, Mesh};
+use super::{GRAIN, Mesh, zeros};
 use crate::error::Error;
 use crate::file;
 
@@ -84,7 +84,7 @@ fn read(path: &Path, key: &blake3::Hash, count: usize) -> io::Result<Vec<Vec3>> 
     if found != head() {
         return Err(io::Error::other("the file is none of this version"));
     }
-    let mut normals = vec![Vec3::ZERO; count];
+    let mut normals = zeros(count);
     let parts = normals.par_chunks_mut(GRAIN).enumerate();
     let sums: io::Result<Vec<u32>> = parts
         .map(|(part, normals)| {

@@ -385,6 +385,12 @@ impl Mesh {
     }
 }
 
+/// So many zeros, by all threads: what takes long is that the system makes each page when it is first touched.
+fn zeros(count: usize) -> Vec<Vec3> {
+    let zeros = (0..count).into_par_iter().with_min_len(GRAIN);
+    zeros.map(|_| Vec3::ZERO).collect()
+}
+
 /// `v` at unit length, or `otherwise` where it has no direction.
 fn unit_or(v: DVec3, otherwise: Vec3) -> Vec3 {
     v.try_normalize().map_or(otherwise, DVec3::as_vec3)

@@ -9,7 +9,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::{GRAIN, unit_or};
+use super::{GRAIN, unit_or, zeros};
 
 /// The normal of a vertex without a face that has one.
 const NOWHERE: Vec3 = Vec3::X;
@@ -25,7 +25,7 @@ pub(super) fn shared(
     triangles: &[[u32; 3]],
     first: impl Fn(u32) -> u32 + Sync,
 ) -> Vec<Vec3> {
-    let mut sums = vec![Vec3::ZERO; positions.len()];
+    let mut sums = zeros(positions.len());
     let mut shares: Vec<[Vec3; 3]> = Vec::new();
     let band = sums.len().div_ceil(rayon::current_num_threads()).max(GRAIN);
     // The angles are the work, and are found in parallel for some triangles at a time; the sums follow.
