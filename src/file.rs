@@ -54,6 +54,15 @@ pub(crate) fn leave(
     Ok(())
 }
 
+/// What stands at the end of a file that is [left](leave): a hash of the checksums of its parts, which belong to `key`.
+pub(crate) fn seal(key: &blake3::Hash, sums: &[u32]) -> blake3::Hash {
+    let mut hasher = blake3::Hasher::new_keyed(key.as_bytes());
+    sums.iter().for_each(|sum| {
+        hasher.update(&sum.to_le_bytes());
+    });
+    hasher.finalize()
+}
+
 /// Finds out, without leaving anything behind, whether `path` could be written.
 pub(crate) fn check_writable(path: &Path) -> Result<()> {
     let target = resolve(path)?;

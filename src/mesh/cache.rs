@@ -56,19 +56,10 @@ impl Mesh {
 }
 
 fn head() -> [u8; HEAD] {
-    let mut head = [1; HEAD];
+    let mut head = [0; HEAD];
     head[..16].copy_from_slice(MAGIC);
     head[16..].copy_from_slice(&1_u64.to_ne_bytes());
     head
-}
-
-/// What stands at a file's end: a hash of the checksums of its parts, which belong to this mesh.
-fn seal(key: &blake3::Hash, sums: &[u32]) -> blake3::Hash {
-    let mut hasher = blake3::Hasher::new_keyed(key.as_bytes());
-    sums.iter().for_each(|sum| {
-        hasher.update(&sum.to_le_bytes());
-    });
-    hasher.finalize()
 }
 
 fn read(path: &Path, key: &blake3::Hash, count: usize) -> io::Result<Vec<Vec3>> {
@@ -98,23 +89,23 @@ fn read(path: &Path, key: &blake3::Hash, count: usize) -> io::Result<Vec<Vec3>> 
             Ok(crc32fast::hash(bytes.as_flattened()))
         })
         .collect();
-    if seal(key, &sums?) != blake3::Hash::from_bytes(sealed) {
+    if file::seal(key, &sums?) != blake3::Hash::from_bytes(sealed) {
         return Err(io::Error::other("the file is damaged"));
     }
     Ok(normals)
 }
 
-fn write(file: &mut dyn Write, key: &blake3::Hash, normals: &[Vec3]) -> io::Result<()> {
-    file.write_all(&head())?;
+fn write(out: &mut dyn Write, key: &blake3::Hash, normals: &[Vec3]) -> io::Result<()> {
+    out.write_all(&head())?;
     let mut sums = Vec::new();
     for normals in normals.chunks(GRAIN) {
         let bytes: Vec<_> = (normals.iter())
             .flat_map(|normal| normal.to_array().map(f32::to_ne_bytes))
             .collect();
         sums.push(crc32fast::hash(bytes.as_flattened()));
-        file.write_all(bytes.as_flattened())?;
+        out.write_all(bytes.as_flattened())?;
     }
-    file.write_all(seal(key, &sums).as_bytes())
+    out.write_all(file::seal(key, &sums).as_bytes())
 }
 
 #[cfg(test)]

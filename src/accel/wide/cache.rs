@@ -17,7 +17,7 @@ use super::node::{BLOCK_INDEX, Block, LEAF, Node};
 use super::{Leaves, Tree, sound};
 use crate::accel::{Build, CacheUse};
 use crate::error::Error;
-use crate::file::{leave, read_at};
+use crate::file::{leave, read_at, seal};
 
 /// What every file begins with. The number changes with what is in the file, and whenever trees are built otherwise.
 const MAGIC: &[u8; 16] = b"etendue tree 2\n\0";
@@ -209,14 +209,10 @@ impl Entry {
     /// The hash of a file's contents, which belong to this key: of checksums, which are several times as fast and miss
     /// no damage that is not meant.
     fn hash(&self, content: &[&[u8]]) -> blake3::Hash {
-        let mut hasher = blake3::Hasher::new_keyed(self.key.as_bytes());
-        for bytes in content {
-            let sums: Vec<u32> = bytes.par_chunks(GRAIN).map(crc32fast::hash).collect();
-            sums.iter().for_each(|sum| {
-                hasher.update(&sum.to_le_bytes());
-            });
-        }
-        hasher.finalize()
+        let sums = content
+            .par_iter()
+            .flat_map(|bytes| bytes.par_chunks(GRAIN).map(crc32fast::hash));
+        seal(&self.key, &sums.collect::<Vec<u32>>())
     }
 
     /// Writes the tree, under another name first: whoever reads finds all of it or nothing.

@@ -89,18 +89,16 @@ pub(super) fn levels(nodes: &[Node], blocks: usize, others: usize) -> Option<usi
 /// Whether blocks hold nothing but triangles of these items, and `others` are those that are none.
 pub(super) fn are_of(blocks: &[Block], others: &[u32], leaves: &impl Leaves) -> bool {
     let numbers = leaves.numbers();
-    // As a rule it is one of the largest mesh.
-    let largest = (numbers.iter().max_by_key(|range| range.len()).cloned()).unwrap_or_default();
     let is_triangle = |number: u32| {
-        largest.contains(&number) || {
-            let range = numbers.partition_point(|range| range.end <= number);
-            (numbers.get(range)).is_some_and(|range| range.start <= number)
-        }
+        let range = numbers.partition_point(|range| range.end <= number);
+        (numbers.get(range)).is_some_and(|range| range.start <= number)
     };
     let lane_is_sound = |block: &Block, lane: usize| match block.ids[lane] {
         u32::MAX => (block.corners.as_flattened().iter()).all(|corner| corner[lane].is_nan()),
         number => is_triangle(number),
     };
+    // As a rule all of a block are of the largest mesh.
+    let largest = (numbers.iter().max_by_key(|range| range.len()).cloned()).unwrap_or_default();
     let is_sound = |block: &Block| {
         (block.ids.iter()).fold(true, |all, id| all & largest.contains(id))
             || (0..BLOCK).all(|lane| lane_is_sound(block, lane))
