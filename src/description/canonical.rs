@@ -120,7 +120,7 @@ impl<'d> Writer<'d> {
                     self.line(format_args!("{name:?}"));
                     self.node(*id);
                 }
-                // There may be millions: their bits are written in a fifth of the time of their digits.
+                // There may be millions, and bits are sooner written than digits.
                 Value::Transform(matrix) => {
                     let [a, b, c, d] = matrix.to_cols_array_2d().map(|c| c.map(f64::to_bits));
                     self.line(format_args!("{name:?} {a:x?} {b:x?} {c:x?} {d:x?}"));

@@ -14,7 +14,7 @@ const GRAIN: usize = 1 << 13;
 
 /// The 8-bit code of linear light `x`, the nearest one.
 pub fn encode_value(x: f32) -> u8 {
-    // It has passed as many borders; a search among them costs a quarter of the curve's power.
+    // It has passed as many borders; a search among them costs less than half of the curve's power.
     BORDERS.partition_point(|border| *border <= x) as u8
 }
 

@@ -62,6 +62,7 @@ impl PointSet for Stratified {
     fn get_2d(&self, key: u64, index: u32, dimension: u32) -> Vec2 {
         let n = self.set_size();
         let (key, index) = place(key, index, n, dimension);
+        // One stratum is neither looked for nor scaled.
         if n == 1 {
             return offset(key, 0, self.jitter);
         }

@@ -344,7 +344,6 @@ impl Ply<'_> {
             self.source.consume(used);
             let new = triangles[first..].as_flattened();
             let highest = new.par_chunks(3 * GRAIN).map(|indices| {
-                // A fold with max is a loop over lanes; the iterator's own is none.
                 indices
                     .iter()
                     .fold(0, |highest: u32, index| highest.max(*index))
