@@ -109,7 +109,16 @@ impl<const N: usize> ColorModel for Bands<N> {
     fn store(&self, color: &Color, role: Role) -> Result<Spectrum, String> {
         let light = role == Role::Emission;
         Ok(match color {
-            Color::Grey(value) | Color::D65(value) => {
+            Color::D65(rgb) => {
+                check(*rgb, role.unbounded())?;
+                let (scale, rgb) = scaled(rgb.map(|v| v as f32));
+                Spectrum::Upsampled {
+                    scale,
+                    sigmoid: fit(rgb),
+                    illuminant: true,
+                }
+            }
+            Color::Grey(value) => {
                 check([*value], role)?;
                 let (scale, grey) = (2.0 * *value as f32, Sigmoid::constant(0.5));
                 if light {
@@ -280,7 +289,12 @@ mod tests {
     #[test]
     fn a_reflectance_keeps_its_rgb_under_d65() {
         let rgb = [0.2, 0.5, 0.8];
-        let result = rgb_of::<16>(16, &Color::Rgb(rgb), Role::Reflectance, &Color::D65(1.0));
+        let result = rgb_of::<16>(
+            16,
+            &Color::Rgb(rgb),
+            Role::Reflectance,
+            &Color::D65([1.0; 3]),
+        );
         for c in 0..3 {
             assert!((result[c] - rgb[c]).abs() < 5e-3, "{result:?}");
         }

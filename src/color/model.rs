@@ -15,8 +15,9 @@ pub enum Color {
     Flat(f64),
     /// Pairs of a wavelength in nm and a value, wavelengths increasing; linear between them, 0 outside.
     Curve(Vec<(f64, f64)>),
-    /// CIE standard illuminant D65 times a factor, such that 1 is the white of RGB.
-    D65(f64),
+    /// CIE standard illuminant D65 times a colour in linear BT.709, such that 1 is the white of RGB; the same whatever
+    /// it stands for.
+    D65([f64; 3]),
 }
 
 /// What a colour stands for, which decides how it is bounded and upsampled.
@@ -30,6 +31,16 @@ pub enum Role {
     Quantity,
     /// A quantity from Mitsuba's tables of metals, whose RGB is that of light with this spectrum.
     Tabulated,
+}
+
+impl Role {
+    /// The same for values that a fraction's bounds do not hold for.
+    pub(super) fn unbounded(self) -> Self {
+        match self {
+            Self::Reflectance => Self::Quantity,
+            other => other,
+        }
+    }
 }
 
 /// RGB or N bands.
@@ -49,6 +60,14 @@ pub trait ColorModel: Clone + std::fmt::Debug + Send + Sync + 'static {
     fn unit(&self) -> Self::Sample;
     /// A scene's colour in its stored form; the error says what is wrong with the value.
     fn store(&self, color: &Color, role: Role) -> Result<Self::Stored, String>;
+    /// What is worth knowing about how [`ColorModel::store`] takes a colour.
+    fn remark(&self, _color: &Color, _role: Role) -> Option<String> {
+        None
+    }
+    /// Whether spectra become three numbers.
+    fn is_rgb(&self) -> bool {
+        false
+    }
     /// A stored colour at a path's wavelengths.
     fn evaluate(stored: &Self::Stored, wavelengths: &Self::Wavelengths) -> Self::Sample;
     /// A texel of linear BT.709 in its stored form; reflectances are clamped to [0, 1].

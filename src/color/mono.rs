@@ -2,7 +2,7 @@
 //! texture of numbers is a texture of this model.
 
 use super::model::{Color, ColorModel, Role, luminance};
-use super::rgb::check;
+use super::rgb::{Rgb, check};
 use super::samples::Samples;
 
 /// The model of plain numbers; a colour counts as its luminance.
@@ -23,12 +23,16 @@ impl ColorModel for Mono {
 
     fn store(&self, color: &Color, role: Role) -> Result<f32, String> {
         let value = match color {
-            Color::Grey(value) | Color::Flat(value) | Color::D65(value) => *value,
+            Color::Grey(value) | Color::Flat(value) => *value,
             Color::Rgb(rgb) => f64::from(luminance(rgb.map(|v| v as f32))),
-            Color::Curve(_) => return Err("a number is needed, not a spectrum".into()),
+            Color::D65(_) | Color::Curve(_) => return Ok(luminance(Rgb.store(color, role)?)),
         };
         check([value], role)?;
         Ok(value as f32)
+    }
+
+    fn remark(&self, color: &Color, role: Role) -> Option<String> {
+        Rgb.remark(color, role)
     }
 
     fn evaluate(stored: &f32, _wavelengths: &()) -> Samples<1> {

@@ -24,26 +24,37 @@ impl ColorModel for Rgb {
 
     fn store(&self, color: &Color, role: Role) -> Result<[f32; 3], String> {
         let rgb = match color {
-            Color::Grey(value) | Color::D65(value) => [*value; 3],
+            Color::Grey(value) => [*value; 3],
             Color::Rgb(rgb) => *rgb,
             Color::Flat(value) if role == Role::Emission => integrate(|_| *value),
             Color::Flat(value) => [*value; 3],
+            Color::D65(rgb) => {
+                check(*rgb, role.unbounded())?;
+                return Ok(rgb.map(|v| v as f32));
+            }
             Color::Curve(points) => {
-                let rgb = match role {
-                    Role::Reflectance | Role::Quantity => {
-                        integrate(|l| curve(points, l) * f64::from(d65(l as f32)))
-                    }
-                    Role::Emission | Role::Tabulated => integrate(|l| curve(points, l)),
-                };
-                if role == Role::Reflectance {
-                    rgb.map(|v| v.clamp(0.0, 1.0))
-                } else {
-                    rgb
-                }
+                check(points.iter().map(|p| p.1), role.unbounded())?;
+                into_gamut(seen(points, role), role)
             }
         };
         check(rgb, role)?;
         Ok(rgb.map(|v| v as f32))
+    }
+
+    fn remark(&self, color: &Color, role: Role) -> Option<String> {
+        let Color::Curve(points) = color else {
+            return None;
+        };
+        let rgb = seen(points, role);
+        let inside = into_gamut(rgb, role);
+        (inside != rgb).then(|| {
+            let [r, g, b] = rgb.map(|v| v as f32);
+            format!("the spectrum's colour {r:.3}, {g:.3}, {b:.3} is out of gamut, and is clamped")
+        })
+    }
+
+    fn is_rgb(&self) -> bool {
+        true
     }
 
     #[inline]
@@ -75,6 +86,25 @@ impl ColorModel for Rgb {
     #[inline]
     fn develop(&self, sample: &Samples<3>, _wavelengths: &(), out: &mut [f32]) {
         out[..3].copy_from_slice(&sample.0);
+    }
+}
+
+/// The linear BT.709 of a curve: of light as it is, of other quantities under D65.
+fn seen(points: &[(f64, f64)], role: Role) -> [f64; 3] {
+    match role {
+        Role::Reflectance | Role::Quantity => {
+            integrate(|l| curve(points, l) * f64::from(d65(l as f32)))
+        }
+        Role::Emission | Role::Tabulated => integrate(|l| curve(points, l)),
+    }
+}
+
+/// A spectrum's colour, clamped to what its role allows.
+fn into_gamut(rgb: [f64; 3], role: Role) -> [f64; 3] {
+    match role {
+        Role::Reflectance => rgb.map(|v| v.clamp(0.0, 1.0)),
+        Role::Emission | Role::Quantity => rgb.map(|v| v.max(0.0)),
+        Role::Tabulated => rgb,
     }
 }
 
@@ -134,7 +164,7 @@ mod tests {
         let cases = [
             (Color::Flat(1.0), [1.204_782_4, 0.948_257_4, 0.908_932]),
             (Color::Curve(points), [20.710_936, 10.855_127, 2.771_202]),
-            (Color::D65(2.0), [2.0, 2.0, 2.0]),
+            (Color::D65([2.0; 3]), [2.0, 2.0, 2.0]),
         ];
         for (color, expected) in cases {
             let rgb = Rgb.store(&color, Role::Emission).unwrap();

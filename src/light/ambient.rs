@@ -21,7 +21,7 @@ impl<C: ColorModel> Ambient<C> {
         context: &LightContext<'_, C>,
     ) -> Result<Self> {
         let colors = &context.palettes.colors;
-        let default = Color::D65(1.0);
+        let default = Color::Grey(1.0);
         Ok(Self {
             radiance: colors.color(properties, "radiance", Role::Emission, default)?,
         })

@@ -40,7 +40,7 @@ impl<C: ColorModel> Area<C> {
                 .help("nest it in a <shape>"));
         };
         let Palettes { colors, .. } = context.palettes;
-        let radiance = colors.texture(properties, "radiance", Role::Emission, Color::D65(1.0))?;
+        let radiance = colors.texture(properties, "radiance", Role::Emission, Color::Grey(1.0))?;
         let (mean, brightness) = match &radiance {
             Texture::Uniform(value) => (mean_of(&colors.color, value.value()), None),
             _ => Brightness::survey(&radiance, shape, &colors.color),

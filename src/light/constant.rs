@@ -27,7 +27,7 @@ impl<C: ColorModel> Constant<C> {
             properties,
             "radiance",
             Role::Emission,
-            Color::D65(1.0),
+            Color::Grey(1.0),
         )?;
         Ok(Self { radiance })
     }

@@ -42,7 +42,7 @@ impl<C: ColorModel> Directional<C> {
             properties,
             "irradiance",
             Role::Emission,
-            Color::D65(1.0),
+            Color::Grey(1.0),
         )?;
         Ok(Self {
             irradiance,

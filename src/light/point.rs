@@ -34,7 +34,7 @@ impl<C: ColorModel> Point<C> {
             properties,
             "intensity",
             Role::Emission,
-            Color::D65(1.0),
+            Color::Grey(1.0),
         )?;
         Ok(Self {
             intensity,

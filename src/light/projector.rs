@@ -33,7 +33,7 @@ impl<C: ColorModel> Projector<C> {
             return Err(properties.error("irradiance", "a projector needs an irradiance"));
         }
         let colors = &context.palettes.colors;
-        let image = colors.texture(properties, "irradiance", Role::Emission, Color::D65(1.0))?;
+        let image = colors.texture(properties, "irradiance", Role::Emission, Color::Grey(1.0))?;
         let [width, height] = image.resolution();
         let aspect = width as f64 / height as f64;
         let tangent = tangent_x(properties, aspect)?;

@@ -49,7 +49,7 @@ impl<C: ColorModel> Spot<C> {
             return Err(properties.error("beam_width", message));
         }
         let colors = &context.palettes.colors;
-        let light = (Role::Emission, Color::D65(1.0));
+        let light = (Role::Emission, Color::Grey(1.0));
         let slide = match properties.object("texture")? {
             Some(child) if child.kind() == Kind::Texture => Some(Texture::build(
                 &child,

@@ -50,7 +50,10 @@ impl Task for Check<'_> {
         match problems.take(prepare::load(description, None, None, limit, self.progress)) {
             Some(assets) => {
                 warnings.extend_from_slice(assets.warnings());
-                problems.take(scene::build(description, &assets, color, Method::Brute));
+                let scene = scene::build(description, &assets, color, Method::Brute);
+                if let Some(scene) = problems.take(scene) {
+                    warnings.extend_from_slice(scene.warnings());
+                }
             }
             None => {
                 problems.take(scene::check_materials(description, color));

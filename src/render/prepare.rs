@@ -260,7 +260,9 @@ fn make<C: ColorModel>(
     })?;
     progress.advance(1, 0);
     let cache = scene.tracer().cache_use().clone();
-    let warnings = assets.warnings().iter().chain(&cache.problems);
+    let warnings = (assets.warnings().iter())
+        .chain(scene.warnings())
+        .chain(&cache.problems);
     let facts = Facts {
         primitives,
         instances: scene.tracer().instance_count(),

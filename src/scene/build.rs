@@ -258,6 +258,7 @@ pub fn build<C: ColorModel>(
         environment = Some((id, emitter));
     }
     builder.problems.finish()?;
+    let warnings = builder.palettes.warnings();
     let Builder {
         materials,
         lights,
@@ -280,6 +281,7 @@ pub fn build<C: ColorModel>(
         ambients,
         environment: environment.map(|(id, _)| id),
         surfacing,
+        warnings,
     })
 }
 

@@ -11,6 +11,7 @@ use glam::{Vec2, Vec3};
 
 use crate::accel::{Counts, Tracer};
 use crate::color::{ColorModel, Spectral};
+use crate::error::Problem;
 use crate::interaction::{Hit, Interaction, Ray};
 use crate::light::{Light, LightSample};
 use crate::material::Material;
@@ -55,12 +56,18 @@ pub struct Scene<C: ColorModel> {
     environment: Option<LightId>,
     /// By shape.
     surfacing: Vec<Surfacing>,
+    warnings: Vec<Problem>,
 }
 
 impl<C: ColorModel> Scene<C> {
     /// The colour model.
     pub fn color(&self) -> &C {
         &self.color
+    }
+
+    /// What is right but worth knowing about its colours.
+    pub fn warnings(&self) -> &[Problem] {
+        &self.warnings
     }
 
     /// The shapes.

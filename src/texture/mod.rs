@@ -1,11 +1,16 @@
-//! Textures: colours (or numbers) that vary over a surface. A texture is a value: materials and lights
-//! own theirs, large images are shared underneath.
+//! Textures and spectra, one family under either tag: colours (or numbers) that vary over a surface or are the same
+//! everywhere. A texture is a value: materials and lights own theirs, large images are shared underneath.
 
 mod bitmap;
+mod blackbody;
 mod checkerboard;
+mod d65;
+mod irregular;
 mod mesh_attribute;
 mod picture;
 mod rawconstant;
+mod regular;
+mod srgb;
 mod uniform;
 mod zoneplate;
 
@@ -17,8 +22,8 @@ use glam::{Mat3, Vec2, Vec3};
 
 use crate::color::{Color, ColorModel, Mono, Rgb, Role, Spectral};
 use crate::description::{Kind, Properties, Property, Spectrum, Value};
-use crate::error::{Error, Result};
-use crate::family::{self, family};
+use crate::error::{Error, Problem, Result};
+use crate::family::family;
 use crate::interaction::Interaction;
 
 use bitmap::Texels;
@@ -39,6 +44,11 @@ pub trait Pattern<C: ColorModel>: std::fmt::Debug + Send + Sync {
     fn resolution(&self) -> [usize; 2] {
         [1, 1]
     }
+
+    /// The value, where it is the same everywhere.
+    fn constant(&self) -> Option<&C::Stored> {
+        None
+    }
 }
 
 family! {
@@ -46,9 +56,14 @@ family! {
     #[derive(Clone, Debug)]
     pub enum Texture<C>: Pattern, kind "texture", context Palette<C> {
         "bitmap" => Bitmap(bitmap::Bitmap<C>),
+        "blackbody" => Blackbody(blackbody::Blackbody<C>),
         "checkerboard" => Checkerboard(checkerboard::Checkerboard<C>),
+        "d65" => D65(d65::D65<C>),
+        "irregular" => Irregular(irregular::Irregular<C>),
         "mesh_attribute" => MeshAttribute(mesh_attribute::MeshAttribute<C>),
         "rawconstant" => RawConstant(rawconstant::RawConstant<C>),
+        "regular" => Regular(regular::Regular<C>),
+        "srgb" => Srgb(srgb::Srgb<C>),
         "uniform" => Uniform(uniform::Uniform<C>),
         "zoneplate" => ZonePlate(zoneplate::ZonePlate<C>),
     }
@@ -62,7 +77,11 @@ pub struct Palette<C: ColorModel> {
     /// What the colours stand for.
     pub role: Role,
     texels: TexelCache<C>,
+    warnings: Warnings,
 }
+
+/// What is worth knowing about the colours that were made.
+type Warnings = Arc<Mutex<Vec<Problem>>>;
 
 type TexelCache<C> = Arc<Mutex<HashMap<(PathBuf, Role, bool), Arc<Texels<C>>>>>;
 
@@ -73,6 +92,7 @@ impl<C: ColorModel> Palette<C> {
             color,
             role: Role::Reflectance,
             texels: TexelCache::default(),
+            warnings: Warnings::default(),
         }
     }
 
@@ -83,10 +103,11 @@ impl<C: ColorModel> Palette<C> {
             color: self.color.clone(),
             role,
             texels: self.texels.clone(),
+            warnings: self.warnings.clone(),
         }
     }
 
-    /// The colour called `name`, or `default`; textures are refused.
+    /// The colour called `name`, or `default`; what varies over a surface is refused.
     pub fn color(
         &self,
         properties: &Properties<'_>,
@@ -94,18 +115,12 @@ impl<C: ColorModel> Palette<C> {
         role: Role,
         default: Color,
     ) -> Result<C::Stored> {
-        let store = |color: &Color| self.color.store(color, role);
-        match properties.value(name) {
-            None => store(&default).map_err(|e| properties.error(name, e)),
-            Some(Property {
-                value: Value::Object(_),
-                ..
-            }) => {
-                let child = properties.object(name)?.expect("the property is an object");
-                store(&spectrum(&child)?).map_err(|e| child.error("value", e))
-            }
-            Some(property) => store(&color(property)?).map_err(|e| properties.error(name, e)),
-        }
+        let texture = self.texture(properties, name, role, default)?;
+        let refused = || {
+            let error = properties.error(name, format!("{name:?} must be the same everywhere"));
+            error.help("give a color or a spectrum instead of this texture")
+        };
+        texture.constant().cloned().ok_or_else(refused)
     }
 
     /// The colour or texture called `name`, or `default` everywhere.
@@ -116,19 +131,90 @@ impl<C: ColorModel> Palette<C> {
         role: Role,
         default: Color,
     ) -> Result<Texture<C>> {
-        if let Some(Property {
-            value: Value::Object(_),
-            ..
-        }) = properties.value(name)
+        let color = match properties.value(name) {
+            None => default,
+            Some(Property {
+                value: Value::Object(_),
+                ..
+            }) => {
+                let child = properties.object(name)?.expect("the property is an object");
+                if matches!(child.kind(), Kind::Texture | Kind::Spectrum) {
+                    return self.nested(&child, role);
+                }
+                let message = format!("{name:?} must be a colour or a texture");
+                return Err(child.error("", message));
+            }
+            Some(property) => color(property)?,
+        };
+        let stored = self.store(properties, name, &color, role)?;
+        Ok(Texture::Uniform(uniform::Uniform::new(stored)))
+    }
+
+    /// The texture that a node describes; one that is the same everywhere becomes [`Texture::Uniform`].
+    pub fn nested(&self, properties: &Properties<'_>, role: Role) -> Result<Texture<C>> {
+        let texture = Texture::build(properties, &self.with_role(role))?;
+        Ok(match texture.constant() {
+            Some(value) => Texture::Uniform(uniform::Uniform::new(value.clone())),
+            None => texture,
+        })
+    }
+
+    /// A colour in its stored form; what is wrong with it, or worth knowing, is told of the property.
+    fn store(
+        &self,
+        properties: &Properties<'_>,
+        name: &'static str,
+        color: &Color,
+        role: Role,
+    ) -> Result<C::Stored> {
+        if let Some(message) = self.color.remark(color, role) {
+            self.warn(properties.error(name, message));
+        }
+        let stored = self.color.store(color, role);
+        stored.map_err(|message| properties.error(name, message))
+    }
+
+    /// The spectrum of points (nm, value) that the node describes.
+    fn curve(&self, properties: &Properties<'_>, points: Vec<(f64, f64)>) -> Result<C::Stored> {
+        if self.color.is_rgb() {
+            let message = format!(
+                "Mitsuba renders {:?} in its spectral variants only; here it is seen by the standard observer",
+                properties.plugin()
+            );
+            self.warn(properties.error("", message));
+        }
+        self.store(properties, "values", &Color::Curve(points), self.role)
+    }
+
+    /// Refuses values below 0 of what is light.
+    fn refuse_negative_light(
+        &self,
+        properties: &Properties<'_>,
+        name: &'static str,
+        values: &[f64],
+    ) -> Result<()> {
+        match values
+            .iter()
+            .find(|v| self.role == Role::Emission && **v < 0.0)
         {
-            let child = properties.object(name)?.expect("the property is an object");
-            if child.kind() == Kind::Texture {
-                return Texture::build(&child, &self.with_role(role));
+            Some(v) => {
+                Err(properties.error(name, format!("emission cannot be negative, and {v} is")))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Notes what is right but worth knowing.
+    pub fn warn(&self, warning: Error) {
+        let mut warnings = self
+            .warnings
+            .lock()
+            .expect("no thread panics while it holds them");
+        for problem in warning.problems() {
+            if !warnings.contains(problem) {
+                warnings.push(problem.clone());
             }
         }
-        Ok(Texture::Uniform(uniform::Uniform::new(
-            self.color(properties, name, role, default)?,
-        )))
     }
 
     /// The same value, which must be valid for the palette's role, everywhere.
@@ -165,11 +251,29 @@ pub struct Palettes<C: ColorModel> {
 impl<C: ColorModel> Palettes<C> {
     /// Nothing loaded yet.
     pub fn new(color: C) -> Self {
+        let colors = Palette::new(color);
+        let warnings = colors.warnings.clone();
         Self {
-            colors: Palette::new(color),
-            numbers: Palette::new(Mono),
-            vectors: Palette::new(Rgb).with_role(Role::Quantity),
+            numbers: Palette {
+                warnings: warnings.clone(),
+                ..Palette::new(Mono)
+            },
+            vectors: Palette {
+                warnings,
+                role: Role::Quantity,
+                ..Palette::new(Rgb)
+            },
+            colors,
         }
+    }
+
+    /// What was noted so far by any of the palettes.
+    pub fn warnings(&self) -> Vec<Problem> {
+        let warnings = &self.colors.warnings;
+        warnings
+            .lock()
+            .expect("no thread panics while it holds them")
+            .clone()
     }
 }
 
@@ -192,16 +296,6 @@ fn color(property: &Property) -> Result<Color> {
     })
 }
 
-/// The colour of a `<spectrum type="…">`.
-fn spectrum(properties: &Properties<'_>) -> Result<Color> {
-    const NAMES: &[&str] = &["d65", "uniform"];
-    match properties.plugin() {
-        "d65" => Ok(Color::D65(properties.float("scale")?.unwrap_or(1.0))),
-        "uniform" => Ok(Color::Grey(properties.float("value")?.unwrap_or(1.0))),
-        other => Err(family::unknown(properties, "spectrum", other, NAMES)),
-    }
-}
-
 /// The property `to_uv`: what is done to texture coordinates before they are looked up.
 fn to_uv(properties: &Properties<'_>) -> Result<Mat3> {
     let Some(m) = properties.transform("to_uv")? else {
@@ -219,3 +313,6 @@ fn to_uv(properties: &Properties<'_>) -> Result<Mat3> {
 fn transformed(to_uv: &Mat3, uv: Vec2) -> Vec2 {
     (*to_uv * uv.extend(1.0)).truncate()
 }
+
+#[cfg(test)]
+mod tests;

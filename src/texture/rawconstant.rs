@@ -23,15 +23,20 @@ impl<C: ColorModel> RawConstant<C> {
             }) => Color::Rgb(v.to_array()),
             Some(_) => Color::Grey(properties.float("value")?.expect("the property is there")),
         };
-        let stored = palette.color.store(&value, Role::Quantity);
-        stored
-            .map(|value| Self { value })
-            .map_err(|e| properties.error("value", e))
+        if let Color::Grey(value) = value {
+            palette.refuse_negative_light(properties, "value", &[value])?;
+        }
+        let value = palette.store(properties, "value", &value, Role::Quantity)?;
+        Ok(Self { value })
     }
 }
 
 impl<C: ColorModel> Pattern<C> for RawConstant<C> {
     fn eval(&self, _at: &Interaction<'_>, wavelengths: &C::Wavelengths) -> C::Sample {
         C::evaluate(&self.value, wavelengths)
+    }
+
+    fn constant(&self) -> Option<&C::Stored> {
+        Some(&self.value)
     }
 }

@@ -1,7 +1,8 @@
-//! `uniform`: the same value everywhere; what a plain colour or number in a scene file becomes.
+//! `uniform`: the same `value` everywhere and at every wavelength; also what a plain colour or number in a scene file
+//! becomes. `wavelength_min` and `wavelength_max` do not bound it in Mitsuba either.
 
 use super::{Palette, Pattern};
-use crate::color::{Color, ColorModel};
+use crate::color::{Color, ColorModel, Role};
 use crate::description::Properties;
 use crate::error::Result;
 use crate::interaction::Interaction;
@@ -24,10 +25,12 @@ impl<C: ColorModel> Uniform<C> {
 
     pub(super) fn build(properties: &Properties<'_>, palette: &Palette<C>) -> Result<Self> {
         let value = properties.float("value")?.unwrap_or(1.0);
-        let stored = palette.color.store(&Color::Grey(value), palette.role);
-        stored
-            .map(Self::new)
-            .map_err(|e| properties.error("value", e))
+        palette.refuse_negative_light(properties, "value", &[value])?;
+        for name in ["wavelength_min", "wavelength_max"] {
+            properties.float(name)?;
+        }
+        let value = palette.store(properties, "value", &Color::Flat(value), Role::Quantity)?;
+        Ok(Self { value })
     }
 }
 
@@ -35,5 +38,9 @@ impl<C: ColorModel> Pattern<C> for Uniform<C> {
     #[inline]
     fn eval(&self, _at: &Interaction<'_>, wavelengths: &C::Wavelengths) -> C::Sample {
         C::evaluate(&self.value, wavelengths)
+    }
+
+    fn constant(&self) -> Option<&C::Stored> {
+        Some(&self.value)
     }
 }
