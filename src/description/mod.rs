@@ -8,6 +8,7 @@ pub mod properties;
 mod canonical;
 mod defines;
 mod element;
+mod encoding;
 mod overrides;
 mod reader;
 mod report;
@@ -133,7 +134,7 @@ pub enum Value {
     Rgb(DVec3),
     /// `<spectrum>` without a type.
     Spectrum(Spectrum),
-    /// `<transform>`: affine and invertible, for column vectors.
+    /// `<transform>`: affine, for column vectors.
     Transform(DMat4),
     /// `<animation>`: at least one (time, transform), times strictly increasing, transforms as above.
     Animation(Vec<(f64, DMat4)>),
@@ -239,7 +240,7 @@ impl Description {
     /// Names every place in the file, or in one it includes, that says something wrong; an XML syntax error alone
     /// ends the search at once.
     pub fn read(path: &Path, options: &Options) -> Result<Self> {
-        Self::parse(&xml::read_text(path)?, path, options)
+        Reader::new(options).file(path)
     }
 
     /// Reads a scene from `text`. Messages name `path`, and its folder is the base of relative file names.

@@ -1,7 +1,8 @@
-//! From bytes to an XML tree and from offsets to lines and columns. Everything that makes an XML reader
-//! slow or greedy (document types, namespaces, thousands of attributes in one tag) is refused before the
-//! tree is made, for a scene has no use for it.
+//! From bytes to an XML tree and from offsets to lines and columns. Comments and document types that XML forbids but
+//! Mitsuba passes over are passed over here too; what makes an XML reader slow or greedy (entities, namespaces,
+//! thousands of attributes in one tag) is refused, for a scene has no use for it.
 
+use std::borrow::Cow;
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -9,6 +10,7 @@ use std::sync::Arc;
 
 use roxmltree::{Document, ParsingOptions};
 
+use super::encoding;
 use crate::error::{Error, Location, Result};
 
 /// Bytes in one scene file: about a million shapes.
@@ -18,8 +20,16 @@ const MAX_NODES: u32 = 8_000_000;
 /// Attributes in one tag; the XML reader compares each with all before it.
 const MAX_ATTRIBUTES: usize = 1000;
 
+/// A file's text.
+#[derive(Debug)]
+pub(super) struct Text {
+    pub(super) text: String,
+    /// What is odd about it.
+    pub(super) warning: Option<Error>,
+}
+
 /// The text of a regular file of at most [`MAX_BYTES`].
-pub(super) fn read_text(path: &Path) -> Result<String> {
+pub(super) fn read_text(path: &Path) -> Result<Text> {
     let refused = |cause| Error::system("read", path, &cause);
     // Asked before it is opened, as opening a pipe may wait for ever.
     if !std::fs::metadata(path).map_err(refused)?.is_file() {
@@ -34,19 +44,76 @@ pub(super) fn read_text(path: &Path) -> Result<String> {
         return Err(Error::input(format!("larger than {} MiB", MAX_BYTES >> 20))
             .at(&Location::of_file(path)));
     }
-    String::from_utf8(bytes).map_err(|e| {
-        let line = 1 + e.as_bytes()[..e.utf8_error().valid_up_to()]
-            .iter()
-            .filter(|&&b| b == b'\n')
-            .count();
-        Error::input("the text is not UTF-8").at(&Location::of_line(
-            path,
-            u32::try_from(line).unwrap_or(u32::MAX),
-        ))
-    })
+    encoding::decode(bytes, path)
 }
 
-/// The XML tree of `text`; syntax errors are located.
+/// `text` with spaces in place of what Mitsuba passes over though XML forbids it, or has no use for: the inside of
+/// comments that hold `--`, and the document type. Every offset stays what it was.
+pub(super) fn tidy(text: &str) -> Cow<'_, str> {
+    let mut blanks = Vec::new();
+    let mut next = 0;
+    while let Some(start) = text[next..].find("<!").map(|i| next + i) {
+        let rest = &text[start..];
+        if let Some(inside) = rest.strip_prefix("<!--") {
+            let Some(length) = inside.find("-->") else {
+                break;
+            };
+            let comment = &inside[..length];
+            if comment.contains("--") || comment.ends_with('-') {
+                blanks.push(start + 4..start + 4 + length);
+            }
+            next = start + 4 + length + 3;
+        } else if rest.starts_with("<![CDATA[") {
+            match rest.find("]]>") {
+                Some(length) => next = start + length,
+                None => break,
+            }
+        } else if rest.starts_with("<!DOCTYPE") {
+            let Some(length) = document_type(rest) else {
+                break;
+            };
+            blanks.push(start..start + length);
+            next = start + length;
+        } else {
+            next = start + 2;
+        }
+    }
+    if blanks.is_empty() {
+        return Cow::Borrowed(text);
+    }
+    let mut tidied = String::with_capacity(text.len());
+    for range in blanks {
+        tidied.push_str(&text[tidied.len()..range.start]);
+        // A space a byte, so that offsets stay; lines stay too.
+        let blank = |b| if b == b'\n' { '\n' } else { ' ' };
+        tidied.extend(text[range].bytes().map(blank));
+    }
+    tidied.push_str(&text[tidied.len()..]);
+    Cow::Owned(tidied)
+}
+
+/// How long the document type is that `text` begins with; `None` where it does not end.
+fn document_type(text: &str) -> Option<usize> {
+    let (mut depth, mut quote) = (0_usize, None);
+    for (i, b) in text.bytes().enumerate() {
+        match (quote, b) {
+            (Some(q), _) if q == b => quote = None,
+            (Some(_), _) => {}
+            (None, b'"' | b'\'') => quote = Some(b),
+            (None, b'<' | b'[') => depth += 1,
+            (None, b'>' | b']') => {
+                depth = depth.checked_sub(1)?;
+                if depth == 0 {
+                    return Some(i + 1);
+                }
+            }
+            _ => {}
+        }
+    }
+    None
+}
+
+/// The XML tree of a `text` that is [tidy](tidy); syntax errors are located.
 pub(super) fn parse<'t>(text: &'t str, lines: &Lines<'t>) -> Result<Document<'t>> {
     if text.len() as u64 > MAX_BYTES {
         return Err(Error::input(format!("larger than {} MiB", MAX_BYTES >> 20)).at(&lines.at(0)));
@@ -59,8 +126,9 @@ pub(super) fn parse<'t>(text: &'t str, lines: &Lines<'t>) -> Result<Document<'t>
     Document::parse_with_options(text, options).map_err(|e| {
         let pos = e.pos();
         let message = match e {
-            roxmltree::Error::DtdDetected => {
-                "a scene has no document type: remove <!DOCTYPE".into()
+            roxmltree::Error::DtdDetected => "the document type does not end".into(),
+            roxmltree::Error::UnknownEntityReference(name, _) => {
+                format!("a scene has no entities: write out what &{name}; stands for")
             }
             roxmltree::Error::NodesLimitReached => format!("more than {MAX_NODES} XML nodes"),
             roxmltree::Error::UnclosedRootNode | roxmltree::Error::UnexpectedEndOfStream => {
@@ -190,5 +258,29 @@ mod tests {
         let text = format!("<scene{attributes}/>");
         let error = parse(&text, &Lines::new(&text, Path::new("a.xml"))).unwrap_err();
         assert!(error.to_string().contains("more than 1000 attributes"));
+    }
+
+    #[test]
+    fn what_is_passed_over_leaves_everything_in_its_place() {
+        let plain = "<a><!-- é - x --><![CDATA[<!-- -- -->]]></a>";
+        assert!(matches!(tidy(plain), Cow::Borrowed(_)));
+        for (text, expected) in [
+            ("<a><!--é--é\n-->b", "<a><!--      \n-->b"),
+            ("<!--x---><a/>", "<!--  --><a/>"),
+            (
+                "<!DOCTYPE a SYSTEM 'a>' [<!ENTITY x \"]>\">]><a/>",
+                "                                           <a/>",
+            ),
+        ] {
+            assert_eq!(tidy(text), expected);
+        }
+        for open in [
+            "<!-- -- ",
+            "<!DOCTYPE a [",
+            "<!DOCTYPE '>",
+            "<![CDATA[ <!-- -- -->",
+        ] {
+            assert_eq!(tidy(open), open);
+        }
     }
 }

@@ -10,6 +10,9 @@ use crate::color::{Color, ColorModel, Role};
 use crate::description::Properties;
 use crate::error::Result;
 
+/// How far a scale may be from 1 without a word.
+const UNIT_LENGTH: f64 = 1e-3;
+
 /// Light from a single direction.
 #[derive(Clone, Debug)]
 pub struct Directional<C: ColorModel> {
@@ -30,10 +33,19 @@ impl<C: ColorModel> Directional<C> {
                 );
             }
             Some(direction) => direction.normalize_or_zero(),
-            None => to_world(properties)?
-                .vector(Vec3::Z)
-                .as_dvec3()
-                .normalize_or_zero(),
+            None => {
+                let axis = to_world(properties)?.vector(Vec3::Z).as_dvec3();
+                let length = axis.length();
+                if (length - 1.0).abs() > UNIT_LENGTH {
+                    let message = format!(
+                        "to_world scales the direction by {length:.4}, and the irradiance stays: Mitsuba multiplies it, and renders another image"
+                    );
+                    let warning = properties.error("to_world", message);
+                    let help = "leave out the scale, and give the irradiance that is meant";
+                    context.palettes.colors.warn(warning.help(help));
+                }
+                axis.normalize_or_zero()
+            }
         };
         if direction == DVec3::ZERO {
             return Err(properties.error("direction", "a direction cannot have length 0"));

@@ -117,6 +117,12 @@ fn to_world(properties: &Properties<'_>) -> Result<Transform> {
         .ok_or_else(|| properties.error("to_world", "the transform must be affine and invertible"))
 }
 
+/// Where the property `to_world` puts the origin, whatever else it does.
+fn origin(properties: &Properties<'_>) -> Result<Vec3> {
+    let matrix = properties.transform("to_world")?.unwrap_or(DMat4::IDENTITY);
+    Ok(matrix.w_axis.truncate().as_vec3())
+}
+
 /// The property `to_world` of a light that is infinitely far: a rotation, maybe mirrored.
 fn rotation(properties: &Properties<'_>) -> Result<Mat3> {
     let m = to_world(properties)?.linear();

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use glam::{Vec2, Vec3};
 
-use super::{Emitter, LightContext, LightSample, mean_of, to_world};
+use super::{Emitter, LightContext, LightSample, mean_of, origin};
 use crate::color::{Color, ColorModel, Role};
 use crate::description::Properties;
 use crate::error::Result;
@@ -28,7 +28,7 @@ impl<C: ColorModel> Point<C> {
                 );
             }
             Some(position) => position.as_vec3(),
-            None => to_world(properties)?.translation(),
+            None => origin(properties)?,
         };
         let intensity = context.palettes.colors.color(
             properties,

@@ -42,13 +42,18 @@ impl<C: ColorModel> Spot<C> {
             let message = format!("a cutoff angle of {cutoff}° is not between 0° and {widest}°");
             return Err(properties.error("cutoff_angle", message));
         }
+        let colors = &context.palettes.colors;
         let beam = properties.float("beam_width")?.unwrap_or(0.75 * cutoff);
-        if !(0.0..=cutoff).contains(&beam) {
-            let message =
-                format!("a beam width of {beam}° is not between 0° and the cutoff angle {cutoff}°");
+        if beam < 0.0 {
+            let message = format!("a beam width cannot be negative, and {beam}° is");
             return Err(properties.error("beam_width", message));
         }
-        let colors = &context.palettes.colors;
+        if beam > cutoff {
+            let message = format!(
+                "the beam width of {beam}° is above the cutoff angle of {cutoff}°, where the light ends"
+            );
+            colors.warn(properties.error("beam_width", message));
+        }
         let light = (Role::Emission, Color::Grey(1.0));
         let slide = match properties.object("texture")? {
             Some(child) if child.kind() == Kind::Texture => Some(Texture::build(
@@ -63,7 +68,7 @@ impl<C: ColorModel> Spot<C> {
             slide,
             to_world: to_world(properties)?,
             cutoff: cutoff.to_radians() as f32,
-            beam: beam.to_radians() as f32,
+            beam: beam.min(cutoff).to_radians() as f32,
         })
     }
 

@@ -14,10 +14,12 @@ use super::resolve::{self, Reference, Scopes};
 use super::upgrade::{self, Version};
 use super::xml::{self, Lines};
 use super::{Description, Kind, Node, NodeId, Options, Property, Value, transform, values};
-use crate::error::{Error, Kind as ErrorKind, Location, Problem, Result};
+use crate::error::{Error, Location, Problem, Result};
 
 /// Levels of nested plugins and includes.
 pub(super) const MAX_DEPTH: usize = 64;
+/// Warnings that are kept.
+const MOST_WARNINGS: usize = 100;
 /// Elements in all files together.
 const MAX_ELEMENTS: usize = 4_000_000;
 
@@ -73,6 +75,12 @@ impl<'o> Reader<'o> {
         }
     }
 
+    /// Reads the scene file at `path`.
+    pub(super) fn file(mut self, path: &Path) -> Result<Description> {
+        let text = self.read_text(path)?;
+        self.scene(&text, path)
+    }
+
     /// Reads the whole scene and resolves it.
     pub(super) fn scene(mut self, text: &str, path: &Path) -> Result<Description> {
         self.open_files
@@ -114,7 +122,8 @@ impl<'o> Reader<'o> {
         include: Option<Place<'_>>,
     ) -> Result<()> {
         let lines = Lines::new(text, path);
-        let tree = xml::parse(text, &lines)?;
+        let text = xml::tidy(text);
+        let tree = xml::parse(&text, &lines)?;
         let root = Element::open(tree.root_element(), &lines, &mut self.defines)?;
         let version = root
             .required("version")
@@ -323,11 +332,26 @@ impl<'o> Reader<'o> {
     fn motion(&mut self, element: &Element<'_>, file: &File<'_>, parent: NodeId) -> Result<()> {
         element.only(&["name"])?;
         let name = element.filled("name")?;
-        let (defines, strict) = (&mut self.defines, self.options.strict);
-        let value = match element.tag {
-            "animation" => Value::Animation(transform::animation(element, file, defines, strict)?),
-            _ => Value::Transform(transform::transform(element, file, defines, strict)?),
+        let mut reading = transform::Reading {
+            file,
+            defines: &mut self.defines,
+            strict: self.options.strict,
+            warnings: Vec::new(),
         };
+        let value = match element.tag {
+            "animation" => Value::Animation(reading.animation(element)?),
+            _ => Value::Transform(reading.transform(element)?),
+        };
+        for warning in reading.warnings {
+            self.warn(warning);
+        }
+        if let Value::Transform(matrix) = value
+            && transform::is_singular(matrix)
+            && self.nodes[parent.index()].kind == Kind::Shape
+        {
+            let warning = element.error("the transform is singular: it flattens the shape");
+            self.warn(warning.help("Mitsuba renders a flattened mesh black where it has normals"));
+        }
         self.property(file, parent, name, value, &element.location);
         Ok(())
     }
@@ -349,17 +373,18 @@ impl<'o> Reader<'o> {
 
     fn warn_of_upgrade(&mut self, root: &Element<'_>) {
         let version = root.optional("version").unwrap_or_default();
-        let warning = Problem {
-            kind: ErrorKind::Input,
-            message: format!(
-                "version {version} is read with the names of version 2.0 (maxDepth as max_depth)"
-            ),
-            location: Some(root.location.clone()),
-            help: None,
-            related: None,
-        };
-        if !self.warnings.contains(&warning) {
-            self.warnings.push(warning);
+        let message = format!(
+            "version {version} is read with the names of version 2.0 (maxDepth as max_depth)"
+        );
+        self.warn(root.error(message));
+    }
+
+    /// Notes what is right but worth knowing, once.
+    fn warn(&mut self, warning: Error) {
+        for problem in warning.problems() {
+            if !self.warnings.contains(problem) && self.warnings.len() < MOST_WARNINGS {
+                self.warnings.push(problem.clone());
+            }
         }
     }
 }

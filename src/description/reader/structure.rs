@@ -55,9 +55,18 @@ impl Reader<'_> {
         result
     }
 
+    /// The text of a file; what is odd about it is noted.
+    pub(super) fn read_text(&mut self, path: &Path) -> Result<String> {
+        let xml::Text { text, warning } = xml::read_text(path)?;
+        if let Some(warning) = warning {
+            self.warn(warning);
+        }
+        Ok(text)
+    }
+
     /// The text of a further file, as long as all together stay within bounds.
     pub(super) fn text(&mut self, path: &Path) -> Result<String> {
-        let text = xml::read_text(path)?;
+        let text = self.read_text(path)?;
         self.bytes += text.len() as u64;
         if self.bytes > xml::MAX_BYTES {
             let limit = xml::MAX_BYTES >> 20;

@@ -133,13 +133,10 @@ fn a_thousand_problems_are_not_all_listed() {
 fn what_is_not_a_text_file_is_refused() {
     let folder = folder(&[("a.xml", "")]);
     assert!(Description::read(folder.path(), &Options::default()).is_err());
-    let path = folder.path().join("latin.xml");
-    std::fs::write(&path, b"<scene>\n\xe9</scene>").expect("a file");
-    let message = read(&folder, "latin.xml").unwrap_err().to_string();
-    assert!(
-        message.contains("latin.xml:2: the text is not UTF-8"),
-        "{message}"
-    );
+    let path = folder.path().join("wide.xml");
+    std::fs::write(&path, b"\xff\xfe<\0s").expect("a file");
+    let message = read(&folder, "wide.xml").unwrap_err().to_string();
+    assert!(message.contains("not valid UTF-16"), "{message}");
     let message = read(&folder, "none.xml").unwrap_err().to_string();
     assert!(message.contains("cannot read"), "{message}");
 }

@@ -198,3 +198,24 @@ fn a_plugin_without_properties_still_refuses_those_it_is_given() {
     assert_eq!(scene.root().children(Kind::Bsdf)[0].plugin(), "null");
     assert_eq!(scene.unread().len(), 1);
 }
+
+#[test]
+fn what_mitsuba_takes_otherwise_is_told_and_what_it_passes_over_is_passed_over() {
+    let text = "<!DOCTYPE scene SYSTEM 'x'><scene version='3.0.0'><!-- a -- b -->
+        <shape type='cube'><transform name='to_world'><rotate x='1' y='1' angle='40'/></transform></shape>
+        <shape type='cube'><transform name='to_world'><scale z='0'/></transform></shape>
+        <shape type='cube'><transform name='to_world'><rotate x='.70711' y='.70711' angle='40'/>
+            <rotate y='2' angle='0'/></transform></shape>
+        <texture type='t'><transform name='to_uv'><scale x='4' y='0'/></transform></texture></scene>";
+    let scene = parse(text).unwrap();
+    let warnings: Vec<_> = scene.warnings().iter().map(ToString::to_string).collect();
+    assert_eq!(warnings.len(), 2, "{warnings:?}");
+    assert!(
+        warnings[0].contains(":2:55: the axis has length 1.4142"),
+        "{warnings:?}"
+    );
+    assert!(
+        warnings[1].contains(":3:28: the transform is singular"),
+        "{warnings:?}"
+    );
+}
