@@ -14,7 +14,7 @@ mod rgb;
 mod samples;
 
 pub use bands::Bands;
-pub use model::{Color, ColorModel, Role, luminance};
+pub use model::{Color, ColorModel, Role, luminance, rgb_to_xyz, xyz_to_rgb};
 pub use mono::Mono;
 pub use rgb::Rgb;
 pub use samples::{Samples, Spectral};

@@ -3,12 +3,14 @@
 
 pub mod srgb;
 
+use std::borrow::Cow;
 use std::path::Path;
 
+use crate::color::xyz_to_rgb;
 use crate::error::Result;
 use crate::image::{self, Format, Image, Metadata, Window};
 
-/// Writes a linear BT.709 image in the format of the extension: `.exr` (every channel, metadata), `.hdr`
+/// Writes an image in linear BT.709 or XYZ in the format of the extension: `.exr` (every channel, metadata), `.hdr`
 /// (main colour) or `.png` (main colour and opacity, encoded by [`srgb::encode`]). The file appears whole
 /// or not at all.
 ///
@@ -16,9 +18,30 @@ use crate::image::{self, Format, Image, Metadata, Window};
 /// Where the extension is another, the format cannot hold the image, or the file system refuses.
 pub fn save(path: &Path, image: &Image, metadata: &Metadata) -> Result<()> {
     match Format::of_output(path)? {
-        Format::Png => image::write_codes(path, &srgb::encode(image)?),
-        Format::Exr | Format::Hdr => image::write(path, image, metadata),
+        Format::Png => image::write_codes(path, &srgb::encode(&in_rgb(image))?),
+        Format::Hdr => image::write(path, &in_rgb(image), metadata),
+        Format::Exr => image::write(path, image, metadata),
     }
+}
+
+/// The image with R, G, B in place of X, Y, Z.
+fn in_rgb(image: &Image) -> Cow<'_, Image> {
+    let [Some(x), Some(y), Some(z)] = ["X", "Y", "Z"].map(|name| image.channel(name)) else {
+        return Cow::Borrowed(image);
+    };
+    let mut names = image.channels().to_vec();
+    for (place, name) in [(x, "R"), (y, "G"), (z, "B")] {
+        names[place] = name.to_owned();
+    }
+    let mut data = image.data().to_vec();
+    for pixel in data.chunks_exact_mut(names.len()) {
+        let rgb = xyz_to_rgb([x, y, z].map(|place| f64::from(pixel[place])));
+        for (place, value) in [x, y, z].into_iter().zip(rgb) {
+            pixel[place] = value as f32;
+        }
+    }
+    let image = Image::from_data(image.width(), image.height(), names, data);
+    Cow::Owned(image.expect("as many samples as before"))
 }
 
 /// Like [`save`], for an image that is a part of a whole: EXR says which, the others only store the part.
@@ -27,8 +50,8 @@ pub fn save(path: &Path, image: &Image, metadata: &Metadata) -> Result<()> {
 /// As [`save`], and where the image reaches beyond the whole.
 pub fn save_window(path: &Path, image: &Image, window: &Window, metadata: &Metadata) -> Result<()> {
     match Format::of_output(path)? {
-        Format::Png => save(path, image, metadata),
-        Format::Exr | Format::Hdr => image::write_window(path, image, window, metadata),
+        Format::Png | Format::Hdr => save(path, image, metadata),
+        Format::Exr => image::write_window(path, image, window, metadata),
     }
 }
 

@@ -46,6 +46,13 @@ impl Default for Filter {
     }
 }
 
+impl Filter {
+    /// How many pixels beyond its own a sample reaches.
+    pub fn reach(&self) -> u32 {
+        (self.radius() + 0.5).ceil() as u32 - 1
+    }
+}
+
 /// The widest radius in pixels, so that a tile's border stays small.
 pub(crate) const MAX_RADIUS: f64 = 16.0;
 

@@ -1,14 +1,19 @@
 //! `aov`: what the camera sees beside light, as channels of their own. `aovs` lists them as
 //! `name:kind, …`; nested integrators give the image itself (the first) and, where they have a name,
-//! channels `name.R` and so on. Where the camera sees nothing a channel is 0.
+//! channels `name.R` and so on; without any it is black and clear. Where the camera sees nothing a channel is 0: shapes
+//! are counted from 1. Emitters that are hidden from light are seen here.
 
-use super::{Context, Cost, Estimate, Estimates, Estimator, Integrator, Start};
+use std::collections::HashSet;
+
+use super::limits;
+use super::{Context, Cost, Estimate, Estimates, Estimator, Footprint, Integrator, Start};
 use crate::color::{ColorModel, Spectral};
 use crate::description::{Kind, Properties, Property, Value};
 use crate::error::Result;
 use crate::interaction::{Interaction, Ray};
 use crate::sampler::Sampler;
 use crate::scene::Scene;
+use glam::Vec2;
 
 /// What a channel group shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,6 +22,8 @@ enum Quantity {
     Depth,
     DpDu,
     DpDv,
+    DuvDx,
+    DuvDy,
     GeoNormal,
     Position,
     PrimIndex,
@@ -31,6 +38,8 @@ const QUANTITIES: &[(&str, Quantity, &[&str])] = &[
     ("depth", Quantity::Depth, &["T"]),
     ("dp_du", Quantity::DpDu, &["X", "Y", "Z"]),
     ("dp_dv", Quantity::DpDv, &["X", "Y", "Z"]),
+    ("duv_dx", Quantity::DuvDx, &["U", "V"]),
+    ("duv_dy", Quantity::DuvDy, &["U", "V"]),
     ("geo_normal", Quantity::GeoNormal, &["X", "Y", "Z"]),
     ("position", Quantity::Position, &["X", "Y", "Z"]),
     ("prim_index", Quantity::PrimIndex, &["I"]),
@@ -52,10 +61,12 @@ struct Nested<C: ColorModel> {
 pub struct Aov<C: ColorModel> {
     quantities: Vec<(String, Quantity, &'static [&'static str])>,
     nested: Vec<Nested<C>>,
+    footprint: Option<Footprint>,
 }
 
 impl<C: ColorModel> Aov<C> {
     pub(super) fn build(properties: &Properties<'_>, context: &Context) -> Result<Self> {
+        limits::hides_emitters(properties)?;
         let mut quantities = Vec::new();
         for item in properties
             .string("aovs")?
@@ -97,7 +108,22 @@ impl<C: ColorModel> Aov<C> {
                 integrator,
             });
         }
-        Ok(Self { quantities, nested })
+        let aov = Self {
+            quantities,
+            nested,
+            footprint: context.footprint.clone(),
+        };
+        let mut names = HashSet::new();
+        let mut channels = Estimator::<C>::extra_channels(&aov).into_iter();
+        match channels.find(|name| !names.insert(name.clone())) {
+            None => Ok(aov),
+            Some(twice) => {
+                let message = format!("two channels would be named \"{twice}\"");
+                Err(properties
+                    .error("aovs", message)
+                    .help("give each name once"))
+            }
+        }
     }
 }
 
@@ -141,10 +167,9 @@ impl<C: ColorModel> Estimator<C> for Aov<C> {
         estimates.extra.clear();
         let mut developed = vec![0.0; scene.color().channels().len()];
         for (i, (start, hit)) in starts.iter().zip(&hits).enumerate() {
-            let alpha = if hit.is_miss() { 0.0 } else { 1.0 };
             let nothing = Estimate {
                 radiance: C::Sample::zero(),
-                alpha,
+                alpha: 0.0,
             };
             estimates.values.push(
                 children
@@ -168,35 +193,47 @@ impl<C: ColorModel> Estimator<C> for Aov<C> {
             for (_, quantity, suffixes) in &self.quantities {
                 let values = at
                     .as_ref()
-                    .map_or([0.0; 3], |at| show(*quantity, scene, start, at));
+                    .map_or([0.0; 3], |at| self.show(*quantity, scene, start, at));
                 estimates.extra.extend_from_slice(&values[..suffixes.len()]);
             }
         }
     }
 }
 
-/// The quantity's channels at a point; those that it does not have are 0.
-fn show<C: ColorModel>(
-    quantity: Quantity,
-    scene: &Scene<C>,
-    start: &Start<C>,
-    at: &Interaction<'_>,
-) -> [f32; 3] {
-    match quantity {
-        Quantity::Albedo => {
-            let mut row = vec![0.0; scene.color().channels().len()];
-            let albedo = scene.material(at).albedo(at, &start.wavelengths);
-            scene.color().develop(&albedo, &start.wavelengths, &mut row);
-            [row[0], row[1], row[2]]
+impl<C: ColorModel> Aov<C> {
+    /// The quantity's channels at a point; those that it does not have are 0.
+    fn show(
+        &self,
+        quantity: Quantity,
+        scene: &Scene<C>,
+        start: &Start<C>,
+        at: &Interaction<'_>,
+    ) -> [f32; 3] {
+        match quantity {
+            Quantity::Albedo => {
+                let mut row = vec![0.0; scene.color().channels().len()];
+                let albedo = scene.material(at).albedo(at, &start.wavelengths);
+                scene.color().develop(&albedo, &start.wavelengths, &mut row);
+                [row[0], row[1], row[2]]
+            }
+            Quantity::Depth => [at.t, 0.0, 0.0],
+            Quantity::DpDu => at.dp_du.to_array(),
+            Quantity::DpDv => at.dp_dv.to_array(),
+            Quantity::DuvDx => self.duv(start, at, 0),
+            Quantity::DuvDy => self.duv(start, at, 1),
+            Quantity::GeoNormal => at.normal.to_array(),
+            Quantity::Position => at.position.to_array(),
+            Quantity::PrimIndex => [at.primitive as f32, 0.0, 0.0],
+            Quantity::ShapeIndex => [(at.shape + 1) as f32, 0.0, 0.0],
+            Quantity::ShNormal => at.frame.n.to_array(),
+            Quantity::Uv => [at.uv.x, at.uv.y, 0.0],
         }
-        Quantity::Depth => [at.t, 0.0, 0.0],
-        Quantity::DpDu => at.dp_du.to_array(),
-        Quantity::DpDv => at.dp_dv.to_array(),
-        Quantity::GeoNormal => at.normal.to_array(),
-        Quantity::Position => at.position.to_array(),
-        Quantity::PrimIndex => [at.primitive as f32, 0.0, 0.0],
-        Quantity::ShapeIndex => [at.shape as f32, 0.0, 0.0],
-        Quantity::ShNormal => at.frame.n.to_array(),
-        Quantity::Uv => [at.uv.x, at.uv.y, 0.0],
+    }
+
+    /// How texture coordinates change along an axis of the film.
+    fn duv(&self, start: &Start<C>, at: &Interaction<'_>, axis: usize) -> [f32; 3] {
+        let footprint = self.footprint.as_ref();
+        let duv = footprint.map_or(Vec2::ZERO, |f| f.duv(&start.ray, at)[axis]);
+        [duv.x, duv.y, 0.0]
     }
 }

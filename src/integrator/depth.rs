@@ -1,5 +1,6 @@
 //! `depth`: the distance from the camera to what it sees, as a grey; 0 where it sees nothing.
 
+use super::limits;
 use super::{Context, Cost, Estimate, Estimates, Estimator, Start};
 use crate::color::{ColorModel, Spectral};
 use crate::description::Properties;
@@ -13,7 +14,8 @@ use crate::scene::Scene;
 pub struct Depth;
 
 impl Depth {
-    pub(super) fn build(_properties: &Properties<'_>, _context: &Context) -> Result<Self> {
+    pub(super) fn build(properties: &Properties<'_>, _context: &Context) -> Result<Self> {
+        limits::hides_emitters(properties)?;
         Ok(Self)
     }
 }

@@ -1,16 +1,19 @@
 //! `direct`: emission and light that arrives directly, by `emitter_samples` of the lights and
 //! `bsdf_samples` of the material (`shading_samples`, 1, for both), combined by multiple importance
-//! sampling. Equal to `path` at `max_depth` 2 in the mean.
+//! sampling. Equal to `path` at `max_depth` 2 in the mean. Whatever the camera meets is opaque, surroundings are not.
+//! `hide_emitters`: see [`super::limits`].
 
+use super::arrival::{Arrival, Scattered, look_through_emitters};
+use super::bounce::{Bounces, Decision};
+use super::limits;
 use super::mis::power;
-use super::{Context, Cost, Estimate, Estimates, Estimator, FIRST_DIMENSION, Start};
+use super::{Context, Cost, Estimate, Estimates, Estimator, Start};
 use crate::color::{ColorModel, Spectral};
 use crate::description::Properties;
 use crate::error::Result;
 use crate::interaction::Ray;
 use crate::sampler::Sampler;
 use crate::scene::Scene;
-use glam::Vec3;
 
 /// The settings.
 #[derive(Clone, Copy, Debug)]
@@ -27,8 +30,8 @@ struct Probe<S> {
     /// What light found there is multiplied by; of a light sample, the light itself is in it.
     factor: S,
     slot: u32,
-    /// Where it starts and the density of a material's sample, unless that is a delta.
-    scattered: Option<(Vec3, f32)>,
+    /// For a material's sample, unless that is a delta.
+    scattered: Option<Scattered>,
 }
 
 /// The most samples of a kind.
@@ -67,7 +70,7 @@ impl Direct {
                 "direct needs at least one sample of either kind",
             ));
         }
-        let hide_emitters = properties.boolean("hide_emitters")?.unwrap_or(false);
+        let hide_emitters = limits::hides_emitters(properties)?;
         Ok(Self {
             emitter_samples,
             bsdf_samples,
@@ -100,34 +103,42 @@ impl<C: ColorModel> Estimator<C> for Direct {
             (starts.iter().map(|s| s.ray).collect(), Vec::new());
         cost.closest(scene, 0, &rays, &mut hits);
 
+        if self.hide_emitters {
+            look_through_emitters(scene, &mut rays, &mut hits, cost);
+        }
+
+        let bounces = Bounces {
+            decisions: self.emitter_samples + self.bsdf_samples,
+        };
         let mut shadows: Vec<Probe<C::Sample>> = Vec::new();
         let mut probes: Vec<Probe<C::Sample>> = Vec::new();
-        for (slot, (start, hit)) in starts.iter().zip(&hits).enumerate() {
+        for (slot, ((start, ray), hit)) in starts.iter().zip(&rays).zip(&hits).enumerate() {
             let (w, slot) = (&start.wavelengths, slot as u32);
-            let at = (!hit.is_miss()).then(|| scene.interaction(&start.ray, hit));
-            let emission = match &at {
-                Some(at) => scene.emitted(at, start.ray.origin, w),
-                None => scene.surrounding(start.ray.direction, w),
+            let at = (!hit.is_miss()).then(|| scene.interaction(ray, hit));
+            let mut estimate = Estimate {
+                radiance: C::Sample::zero(),
+                alpha: if at.is_some() { 1.0 } else { 0.0 },
             };
-            let mut radiance = emission
-                .filter(|_| !self.hide_emitters)
-                .map_or(C::Sample::zero(), |e| e.0);
-            if let Some(ambient) = at.as_ref().and_then(|at| scene.ambient(at, w)) {
-                radiance += ambient;
-            }
-            let surrounded = scene.has_environment() && !self.hide_emitters;
-            let alpha = if at.is_some() || surrounded { 1.0 } else { 0.0 };
-            estimates.push(Estimate {
-                radiance: radiance * scene.color().unit(),
-                alpha,
-            });
+            let arrival = Arrival {
+                scene,
+                ray,
+                at: at.as_ref(),
+                wavelengths: w,
+                throughput: scene.color().unit(),
+                scattered: None,
+                hides_surroundings: self.hide_emitters,
+            };
+            arrival.add_to(&mut estimate);
+            estimates.push(estimate);
             let Some(at) = at else { continue };
             cost.stats.shaded += 1;
             let material = scene.material(&at);
             let mut stream = start.stream;
-            stream.seek(FIRST_DIMENSION);
+            if bounces.begin(&mut stream, 0).is_none() {
+                continue;
+            }
             for _ in 0..self.emitter_samples {
-                let (u2, u1) = (stream.next_2d(sampler), stream.next_1d(sampler));
+                let Decision { u2, u1 } = Decision::next(&mut stream, sampler);
                 let Some(light) = scene.sample_light(at.position, u1, u2, w) else {
                     continue;
                 };
@@ -156,13 +167,17 @@ impl<C: ColorModel> Estimator<C> for Direct {
                 }
             }
             for _ in 0..self.bsdf_samples {
-                let (u2, u1) = (stream.next_2d(sampler), stream.next_1d(sampler));
+                let Decision { u2, u1 } = Decision::next(&mut stream, sampler);
                 let Some(sample) = material.sample(&at, at.wi, u1, u2, w) else {
                     continue;
                 };
                 let factor = scene.color().unit() * sample.weight / self.bsdf_samples as f32;
                 let ray = at.spawn(at.frame.to_world(sample.wo));
-                let scattered = (!sample.delta).then_some((at.position, sample.pdf));
+                let scattered = (!sample.delta).then_some(Scattered {
+                    from: at.position,
+                    pdf: sample.pdf * bsdf_share,
+                    light_share,
+                });
                 probes.push(Probe {
                     ray,
                     factor,
@@ -187,22 +202,17 @@ impl<C: ColorModel> Estimator<C> for Direct {
         cost.closest(scene, 1, &rays, &mut hits);
         for (probe, hit) in probes.iter().zip(&hits) {
             let w = &starts[probe.slot as usize].wavelengths;
-            let from = probe.scattered.map_or(probe.ray.origin, |(from, _)| from);
             let at = (!hit.is_miss()).then(|| scene.interaction(&probe.ray, hit));
-            if let Some(ambient) = at.as_ref().and_then(|at| scene.ambient(at, w)) {
-                estimates[probe.slot as usize].radiance += probe.factor * ambient;
-            }
-            let emission = match &at {
-                Some(at) => scene.emitted(at, from, w),
-                None => scene.surrounding(probe.ray.direction, w),
+            let arrival = Arrival {
+                scene,
+                ray: &probe.ray,
+                at: at.as_ref(),
+                wavelengths: w,
+                throughput: probe.factor,
+                scattered: probe.scattered,
+                hides_surroundings: false,
             };
-            let Some((radiance, light_pdf)) = emission else {
-                continue;
-            };
-            let weight = probe.scattered.map_or(1.0, |(_, pdf)| {
-                power(pdf * bsdf_share, light_pdf * light_share)
-            });
-            estimates[probe.slot as usize].radiance += probe.factor * radiance * weight;
+            arrival.add_to(&mut estimates[probe.slot as usize]);
         }
     }
 }

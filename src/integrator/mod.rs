@@ -13,7 +13,11 @@ mod moment;
 mod path;
 mod phong;
 
+mod arrival;
+mod bounce;
+mod footprint;
 mod layers;
+mod limits;
 mod mis;
 
 use crate::color::ColorModel;
@@ -23,6 +27,8 @@ use crate::sampler::{Sampler, Stream};
 use crate::scene::Scene;
 
 pub use cost::{Cost, Stats};
+pub use footprint::Footprint;
+pub use limits::timeout_note;
 
 /// A camera sample.
 #[derive(Clone, Copy, Debug)]
@@ -40,7 +46,7 @@ pub struct Start<C: ColorModel> {
 pub struct Estimate<S> {
     /// Radiance toward the camera.
     pub radiance: S,
-    /// Whether the sample met anything, as opacity.
+    /// Opacity: whether the sample met anything but what lets it pass as if it were not there.
     pub alpha: f32,
 }
 
@@ -77,6 +83,8 @@ pub struct Context {
     /// The names of the scene's lights in their order, as [`crate::scene::light_names`] gives them; the
     /// integrator then serves scenes with these lights.
     pub lights: Vec<String>,
+    /// Of the camera, for channels that show how its rays spread; without, these are 0.
+    pub footprint: Option<Footprint>,
 }
 
 family! {

@@ -1,6 +1,7 @@
 //! `moment`: renders its nested integrator. (Mitsuba's also writes the samples' squares; its scenes use
 //! it for their references, and the image is the nested one's.)
 
+use super::limits;
 use super::{Context, Cost, Estimates, Estimator, Integrator, Start};
 use crate::color::ColorModel;
 use crate::description::{Kind, Properties};
@@ -16,6 +17,7 @@ pub struct Moment<C: ColorModel> {
 
 impl<C: ColorModel> Moment<C> {
     pub(super) fn build(properties: &Properties<'_>, context: &Context) -> Result<Self> {
+        limits::hides_emitters(properties)?;
         match &properties.children(Kind::Integrator)[..] {
             [child] => Ok(Self {
                 nested: Box::new(Integrator::<C>::build(child, context)?),

@@ -1,11 +1,13 @@
 //! `path`: unidirectional path tracing (Kajiya, *The rendering equation*, 1986) with one light sample a
 //! bounce, multiple importance sampling and Russian roulette.
 //!
-//! `max_depth` counts edges: 1 is emission seen directly, 2 direct light, −1 (default) no limit.
-//! Roulette starts at `rr_depth` (5) and lets a path live with probability min(max(throughput)·η², 0.95).
+//! `max_depth`, `rr_depth` and `hide_emitters`: see [`super::limits`].
 
+use super::arrival::{Arrival, Scattered, look_through_emitters, opacity_at_start};
+use super::bounce::{Bounces, Decision};
+use super::limits::{self, Limits};
 use super::mis::power;
-use super::{Context, Cost, Estimate, Estimates, Estimator, FIRST_DIMENSION, Start};
+use super::{Context, Cost, Estimate, Estimates, Estimator, Start};
 use crate::color::{ColorModel, Spectral};
 use crate::description::Properties;
 use crate::error::Result;
@@ -13,7 +15,6 @@ use crate::interaction::{Interaction, Ray};
 use crate::light::LightSample;
 use crate::sampler::{Sampler, Stream};
 use crate::scene::Scene;
-use glam::Vec3;
 
 /// The path tracer's settings.
 #[derive(Clone, Copy, Debug, Default)]
@@ -22,59 +23,8 @@ pub struct Path {
     hide_emitters: bool,
 }
 
-/// How long a path may become: `max_depth` and `rr_depth`.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Limits {
-    /// Edges; `u32::MAX` is no limit.
-    pub(super) max_depth: u32,
-    rr_depth: u32,
-}
-
-impl Default for Limits {
-    fn default() -> Self {
-        Self {
-            max_depth: u32::MAX,
-            rr_depth: 5,
-        }
-    }
-}
-
-impl Limits {
-    pub(super) fn build(properties: &Properties<'_>) -> Result<Self> {
-        let depth = |name: &'static str, default: i64, least: i64| {
-            let depth = properties.integer(name)?.unwrap_or(default);
-            if depth < least {
-                return Err(properties.error(
-                    name,
-                    format!("{name} must be at least {least}, and {depth} is not"),
-                ));
-            }
-            Ok(u32::try_from(depth).unwrap_or(u32::MAX))
-        };
-        Ok(Self {
-            max_depth: depth("max_depth", -1, -1)?,
-            rr_depth: depth("rr_depth", 5, 1)?,
-        })
-    }
-
-    /// The probability with which roulette lets a path live on after its bounce at `depth`; `None` where it
-    /// carries nothing.
-    pub(super) fn survival<S: Spectral>(&self, depth: u32, throughput: S, eta: f32) -> Option<f32> {
-        if throughput.is_black() {
-            return None;
-        }
-        if depth + 1 < self.rr_depth {
-            return Some(1.0);
-        }
-        Some((throughput.max_value() * eta * eta).min(MAX_SURVIVAL))
-    }
-}
-
-/// Dimensions of a bounce, in fours: the point on a light, which light, and one to spare; the direction, the
-/// lobe, roulette.
-const DIMENSIONS: u32 = 8;
-/// The longest life that roulette grants.
-const MAX_SURVIVAL: f32 = 0.95;
+/// A bounce decides on a light and on the way on.
+const BOUNCES: Bounces = Bounces { decisions: 2 };
 
 /// A path on its way.
 #[derive(Clone, Copy, Debug)]
@@ -87,8 +37,8 @@ struct Walker<C: ColorModel> {
     slot: u32,
     /// Product of the indices of refraction passed.
     eta: f32,
-    /// Where the ray was scattered and with what density, unless at the camera or into a delta lobe.
-    scattered: Option<(Vec3, f32)>,
+    /// Where the ray was scattered, unless at the camera or into a delta lobe.
+    scattered: Option<Scattered>,
 }
 
 /// A light sample whose visibility is still to be asked.
@@ -103,39 +53,8 @@ impl Path {
     pub(super) fn build(properties: &Properties<'_>, _context: &Context) -> Result<Self> {
         Ok(Self {
             limits: Limits::build(properties)?,
-            hide_emitters: properties.boolean("hide_emitters")?.unwrap_or(false),
+            hide_emitters: limits::hides_emitters(properties)?,
         })
-    }
-
-    /// Adds to the estimate what comes from the ray's end: the point `at`, or the surroundings.
-    fn arrive<C: ColorModel>(
-        &self,
-        scene: &Scene<C>,
-        depth: u32,
-        walker: &Walker<C>,
-        at: Option<&Interaction<'_>>,
-        estimate: &mut Estimate<C::Sample>,
-    ) {
-        let hidden = depth == 0 && self.hide_emitters;
-        let from = walker.scattered.map_or(walker.ray.origin, |(from, _)| from);
-        let emission = match at {
-            Some(at) => scene.emitted(at, from, &walker.wavelengths),
-            None => scene.surrounding(walker.ray.direction, &walker.wavelengths),
-        };
-        if let Some((radiance, light_pdf)) = emission.filter(|_| !hidden) {
-            let weight = walker
-                .scattered
-                .map_or(1.0, |(_, pdf)| power(pdf, light_pdf));
-            estimate.radiance += walker.throughput * radiance * weight;
-        }
-        let ambient = |at| scene.ambient(at, &walker.wavelengths);
-        if let Some(ambient) = at.and_then(ambient) {
-            estimate.radiance += walker.throughput * ambient;
-        }
-        if depth == 0 {
-            let surrounded = scene.has_environment() && !self.hide_emitters;
-            estimate.alpha = if at.is_some() || surrounded { 1.0 } else { 0.0 };
-        }
     }
 
     /// Light drawn toward `at`, if any may arrive.
@@ -145,8 +64,7 @@ impl Path {
         walker: &mut Walker<C>,
         at: &Interaction<'_>,
     ) -> Option<Shadow<C::Sample>> {
-        let u2 = walker.stream.next_2d(sampler);
-        let u1 = walker.stream.next_1d(sampler);
+        let Decision { u2, u1 } = Decision::next(&mut walker.stream, sampler);
         let material = scene.material(at);
         if !material.is_smooth() {
             return None;
@@ -183,26 +101,29 @@ impl Path {
         depth: u32,
         walker: &mut Walker<C>,
         at: &Interaction<'_>,
+        estimate: &mut Estimate<C::Sample>,
     ) -> bool {
-        let u2 = walker.stream.next_2d(sampler);
-        let u1 = walker.stream.next_1d(sampler);
+        let Decision { u2, u1 } = Decision::next(&mut walker.stream, sampler);
         let material = scene.material(at);
-        let Some(sample) = material.sample(at, at.wi, u1, u2, &walker.wavelengths) else {
+        let sample = material.sample(at, at.wi, u1, u2, &walker.wavelengths);
+        if !sample.is_some_and(|sample| sample.null) {
+            estimate.alpha = 1.0;
+        }
+        let Some(sample) = sample else {
             return false;
         };
-        walker.throughput *= sample.weight;
         walker.eta *= sample.eta;
         walker.ray = at.spawn(at.frame.to_world(sample.wo));
-        walker.scattered = (!sample.delta).then_some((at.position, sample.pdf));
-        let survival = self.limits.survival(depth, walker.throughput, walker.eta);
-        let Some(survival) = survival else {
-            return false;
-        };
-        if survival < 1.0 {
-            if walker.stream.next_1d(sampler) >= survival {
-                return false;
-            }
-            walker.throughput = walker.throughput / survival;
+        walker.scattered = (!sample.delta).then_some(Scattered {
+            from: at.position,
+            pdf: sample.pdf,
+            light_share: 1.0,
+        });
+        let throughput = walker.throughput * sample.weight;
+        let draw = || walker.stream.next_1d(sampler);
+        match self.limits.roulette(depth, throughput, walker.eta, draw) {
+            Some(throughput) => walker.throughput = throughput,
+            None => return false,
         }
         true
     }
@@ -219,13 +140,12 @@ impl<C: ColorModel> Estimator<C> for Path {
     ) {
         let estimates = &mut estimates.values;
         estimates.clear();
-        estimates.resize(
-            starts.len(),
-            Estimate {
-                radiance: C::Sample::zero(),
-                alpha: 0.0,
-            },
-        );
+        let alpha = match self.limits.max_depth {
+            0 => 0.0,
+            _ => opacity_at_start(scene, self.hide_emitters),
+        };
+        let radiance = C::Sample::zero();
+        estimates.resize(starts.len(), Estimate { radiance, alpha });
         if self.limits.max_depth == 0 {
             return;
         }
@@ -253,23 +173,34 @@ impl<C: ColorModel> Estimator<C> for Path {
             rays.extend(walkers.iter().map(|w| w.ray));
             cost.closest(scene, depth, &rays, &mut hits);
 
-            let mut hits = hits.iter();
+            if depth == 0 && self.hide_emitters {
+                look_through_emitters(scene, &mut rays, &mut hits, cost);
+            }
+
+            let mut ends = rays.iter().zip(&hits);
             walkers.retain_mut(|walker| {
-                let hit = hits.next().expect("every ray has its hit");
+                let (ray, hit) = ends.next().expect("every walker has its ray");
                 let estimate = &mut estimates[walker.slot as usize];
-                if hit.is_miss() {
-                    self.arrive(scene, depth, walker, None, estimate);
+                let at = (!hit.is_miss()).then(|| scene.interaction(ray, hit));
+                let arrival = Arrival {
+                    scene,
+                    ray,
+                    at: at.as_ref(),
+                    wavelengths: &walker.wavelengths,
+                    throughput: walker.throughput,
+                    scattered: walker.scattered,
+                    hides_surroundings: self.hide_emitters && estimate.alpha == 0.0,
+                };
+                arrival.add_to(estimate);
+                let Some(at) = at.filter(|_| depth + 1 < self.limits.max_depth) else {
                     return false;
-                }
-                let at = scene.interaction(&walker.ray, hit);
-                self.arrive(scene, depth, walker, Some(&at), estimate);
-                if depth + 1 >= self.limits.max_depth {
-                    return false;
-                }
+                };
                 cost.stats.shaded += 1;
-                walker.stream.seek(FIRST_DIMENSION + depth * DIMENSIONS);
+                if BOUNCES.begin(&mut walker.stream, depth).is_none() {
+                    return false;
+                }
                 shadows.extend(Self::light(scene, sampler, walker, &at));
-                self.scatter(scene, sampler, depth, walker, &at)
+                self.scatter(scene, sampler, depth, walker, &at, estimate)
             });
 
             cost.occluded(scene, shadows.iter().map(|s| s.ray), &mut blocked);

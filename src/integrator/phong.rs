@@ -7,16 +7,19 @@
 //! light brings, and of area lights the integral of L·cos θ·dA over what can be seen of them, one point of
 //! which is drawn. With `falloff` `none` (default) that is all; `inverse_square` divides by the squared
 //! distance. An environment brings the integral of L·dω. There is no π: against `path`, a matte surface is π
-//! times as bright. `shadows` (true) may be switched off; `max_depth` and `rr_depth` are those of `path`;
+//! times as bright. `shadows` (true) may be switched off; `max_depth`, `rr_depth` and
+//! `hide_emitters` are those of `path`;
 //! `layers` takes the image apart, see [`super::layers`].
 
+use super::arrival::{Arrival, look_through_emitters, opacity_at_start};
+use super::bounce::{Bounces, Decision};
 use super::layers::{Layers, Term};
-use super::path::Limits;
-use super::{Context, Cost, Estimate, Estimates, Estimator, FIRST_DIMENSION, Start};
+use super::limits::{self, Limits};
+use super::{Context, Cost, Estimate, Estimates, Estimator, Start};
 use crate::color::{ColorModel, Spectral};
 use crate::description::Properties;
 use crate::error::Result;
-use crate::interaction::{Hit, Interaction, Ray};
+use crate::interaction::{Interaction, Ray};
 use crate::light::LightSample;
 use crate::sampler::{Sampler, Stream};
 use crate::scene::Scene;
@@ -40,8 +43,6 @@ enum Falloff {
 
 const FALLOFFS: [&str; 2] = ["none", "inverse_square"];
 
-/// Dimensions of a bounce beside two a light: lobe, direction, roulette.
-const DIMENSIONS: u32 = 4;
 /// Shadow rays that are asked about at once: a scene may have any number of lights.
 const SHADOWS: usize = 1 << 14;
 
@@ -134,43 +135,30 @@ impl Phong {
         };
         Ok(Self {
             limits: Limits::build(properties)?,
-            hide_emitters: properties.boolean("hide_emitters")?.unwrap_or(false),
+            hide_emitters: limits::hides_emitters(properties)?,
             falloff,
             shadows: properties.boolean("shadows")?.unwrap_or(true),
             layers: Layers::build(properties, &context.lights)?,
         })
     }
 
-    /// What the ray meets at its end, if anything: emission and ambient light go to the estimate.
-    fn arrive<'s, C: ColorModel>(
+    /// Adds what the ray's end brings: emission, ambient light, opacity.
+    fn arrive<C: ColorModel>(
         &self,
-        scene: &'s Scene<C>,
-        depth: u32,
-        walker: &Walker<C>,
-        hit: &Hit,
+        arrival: &Arrival<'_, '_, C>,
+        slot: u32,
         batch: &mut Batch<'_, C::Sample>,
-    ) -> Option<Interaction<'s>> {
-        let (ray, w) = (&walker.ray, &walker.wavelengths);
-        let at = (!hit.is_miss()).then(|| scene.interaction(ray, hit));
-        let (light, emission) = match &at {
-            Some(at) => (scene.light_at(at), scene.emitted(at, ray.origin, w)),
-            None => (scene.environment(), scene.surrounding(ray.direction, w)),
-        };
-        let shown = depth > 0 || !self.hide_emitters;
-        if let (Some(light), Some((radiance, _)), true) = (light, emission, shown) {
+    ) {
+        if let (Some(light), Some(emission)) = (arrival.light(), arrival.emission()) {
             let layer = self.layers.place(Term::Emission, light.index());
-            batch.add(walker.slot, layer, walker.throughput * radiance);
+            batch.add(slot, layer, emission);
         }
-        if let Some(ambient) = at.as_ref().and_then(|at| scene.ambient(at, w)) {
-            let layer = self.layers.ambient();
-            batch.add(walker.slot, layer, walker.throughput * ambient);
+        if let Some(ambient) = arrival.ambient() {
+            batch.add(slot, self.layers.ambient(), ambient);
         }
-        if depth == 0 {
-            let surrounded = scene.has_environment() && !self.hide_emitters;
-            batch.values[walker.slot as usize].alpha =
-                if at.is_some() || surrounded { 1.0 } else { 0.0 };
+        if arrival.is_opaque() {
+            batch.values[slot as usize].alpha = 1.0;
         }
-        at
     }
 
     /// The terms of one light at a point, as if nothing stood between.
@@ -182,14 +170,15 @@ impl Phong {
         walker: &mut Walker<C>,
         at: &Interaction<'_>,
     ) -> Option<Shadow<C::Sample>> {
-        let (u, w) = (walker.stream.next_2d(sampler), &walker.wavelengths);
+        let Decision { u2, .. } = Decision::next(&mut walker.stream, sampler);
+        let w = &walker.wavelengths;
         let LightSample {
             direction,
             target,
             radiance,
             pdf,
             ..
-        } = scene.lights()[light].sample(at.position, u, w)?;
+        } = scene.lights()[light].sample(at.position, u2, w)?;
         let wo = at.frame.to_local(direction);
         let terms = scene.material(at).phong(at, at.wi, wo, w)?;
         // What a light sample brings has the inverse square in it.
@@ -209,32 +198,34 @@ impl Phong {
         })
     }
 
-    /// Follows a mirror or a clear boundary at `at`; `None` where there is none.
+    /// Follows a mirror or a clear boundary at `at`; whether there is one.
     fn follow<C: ColorModel>(
         &self,
         scene: &Scene<C>,
         sampler: &Sampler,
         depth: u32,
-        mut walker: Walker<C>,
+        walker: &mut Walker<C>,
         at: &Interaction<'_>,
-    ) -> Option<Walker<C>> {
-        let (u1, u2) = (
-            walker.stream.next_1d(sampler),
-            walker.stream.next_2d(sampler),
-        );
-        let sample = scene
-            .material(at)
-            .sample(at, at.wi, u1, u2, &walker.wavelengths)
-            .filter(|sample| sample.delta)?;
-        walker.throughput *= sample.weight;
+        estimate: &mut Estimate<C::Sample>,
+    ) -> bool {
+        let Decision { u2, u1 } = Decision::next(&mut walker.stream, sampler);
+        let material = scene.material(at);
+        let sample = material.sample(at, at.wi, u1, u2, &walker.wavelengths);
+        if !sample.is_some_and(|sample| sample.null) {
+            estimate.alpha = 1.0;
+        }
+        let Some(sample) = sample.filter(|sample| sample.delta) else {
+            return false;
+        };
         walker.eta *= sample.eta;
         walker.ray = at.spawn(at.frame.to_world(sample.wo));
-        let survival = self.limits.survival(depth, walker.throughput, walker.eta)?;
-        if survival < 1.0 && walker.stream.next_1d(sampler) >= survival {
-            return None;
+        let throughput = walker.throughput * sample.weight;
+        let draw = || walker.stream.next_1d(sampler);
+        match self.limits.roulette(depth, throughput, walker.eta, draw) {
+            Some(throughput) => walker.throughput = throughput,
+            None => return false,
         }
-        walker.throughput = walker.throughput / survival;
-        Some(walker)
+        true
     }
 }
 
@@ -257,7 +248,10 @@ impl<C: ColorModel> Estimator<C> for Phong {
     ) {
         let nothing = Estimate {
             radiance: C::Sample::zero(),
-            alpha: 0.0,
+            alpha: match self.limits.max_depth {
+                0 => 0.0,
+                _ => opacity_at_start(scene, self.hide_emitters),
+            },
         };
         estimates.values.clear();
         estimates.values.resize(starts.len(), nothing);
@@ -280,7 +274,9 @@ impl<C: ColorModel> Estimator<C> for Phong {
         };
         let mut walkers: Vec<Walker<C>> = starts.iter().enumerate().map(walker).collect();
         let lights = scene.lights().len();
-        let dimensions = DIMENSIONS + 2 * lights as u32;
+        let bounces = Bounces {
+            decisions: lights as u32 + 1,
+        };
         let (mut rays, mut hits) = (Vec::new(), Vec::new());
         for depth in 0..self.limits.max_depth {
             if walkers.is_empty() {
@@ -290,32 +286,45 @@ impl<C: ColorModel> Estimator<C> for Phong {
             rays.extend(walkers.iter().map(|w| w.ray));
             cost.closest(scene, depth, &rays, &mut hits);
 
-            let mut hits = hits.iter();
-            walkers = walkers
-                .into_iter()
-                .filter_map(|mut walker| {
-                    let hit = hits.next().expect("every ray has its hit");
-                    let at = self.arrive(scene, depth, &walker, hit, &mut batch)?;
-                    if depth + 1 >= self.limits.max_depth {
-                        return None;
+            if depth == 0 && self.hide_emitters {
+                look_through_emitters(scene, &mut rays, &mut hits, cost);
+            }
+
+            let mut ends = rays.iter().zip(&hits);
+            walkers.retain_mut(|walker| {
+                let (ray, hit) = ends.next().expect("every walker has its ray");
+                let at = (!hit.is_miss()).then(|| scene.interaction(ray, hit));
+                let slot = walker.slot as usize;
+                let arrival = Arrival {
+                    scene,
+                    ray,
+                    at: at.as_ref(),
+                    wavelengths: &walker.wavelengths,
+                    throughput: walker.throughput,
+                    scattered: None,
+                    hides_surroundings: self.hide_emitters && batch.values[slot].alpha == 0.0,
+                };
+                self.arrive(&arrival, walker.slot, &mut batch);
+                let Some(at) = at.filter(|_| depth + 1 < self.limits.max_depth) else {
+                    return false;
+                };
+                cost.stats.shaded += 1;
+                if bounces.begin(&mut walker.stream, depth).is_none() {
+                    return false;
+                }
+                let smooth = scene.material(&at).is_smooth();
+                for light in (0..lights).filter(|_| smooth) {
+                    match self.light(scene, sampler, light, walker, &at) {
+                        Some(shadow) if self.shadows => batch.shadows.push(shadow),
+                        Some(shadow) => batch.light(&shadow),
+                        None => {}
                     }
-                    cost.stats.shaded += 1;
-                    let first = depth.wrapping_mul(dimensions);
-                    walker.stream.seek(FIRST_DIMENSION.wrapping_add(first));
-                    let smooth = scene.material(&at).is_smooth();
-                    for light in (0..lights).filter(|_| smooth) {
-                        match self.light(scene, sampler, light, &mut walker, &at) {
-                            Some(shadow) if self.shadows => batch.shadows.push(shadow),
-                            Some(shadow) => batch.light(&shadow),
-                            None => {}
-                        }
-                        if batch.shadows.len() == SHADOWS {
-                            batch.flush(scene, cost);
-                        }
+                    if batch.shadows.len() == SHADOWS {
+                        batch.flush(scene, cost);
                     }
-                    self.follow(scene, sampler, depth, walker, &at)
-                })
-                .collect();
+                }
+                self.follow(scene, sampler, depth, walker, &at, &mut batch.values[slot])
+            });
             batch.flush(scene, cost);
         }
 

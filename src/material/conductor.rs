@@ -51,6 +51,7 @@ impl<C: ColorModel> Bsdf<C> for Conductor<C> {
             pdf: 1.0,
             eta: 1.0,
             delta: true,
+            null: false,
         })
     }
 }

@@ -60,6 +60,7 @@ impl<C: ColorModel> Bsdf<C> for Dielectric<C> {
                 pdf: boundary.reflectance,
                 eta: 1.0,
                 delta: true,
+                null: false,
             }
         } else {
             BsdfSample {
@@ -68,6 +69,7 @@ impl<C: ColorModel> Bsdf<C> for Dielectric<C> {
                 pdf: 1.0 - boundary.reflectance,
                 eta: boundary.eta,
                 delta: true,
+                null: false,
             }
         })
     }

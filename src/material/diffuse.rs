@@ -77,6 +77,7 @@ impl<C: ColorModel> Bsdf<C> for Diffuse<C> {
             pdf,
             eta: 1.0,
             delta: false,
+            null: false,
         })
     }
 

@@ -48,6 +48,8 @@ pub struct BsdfSample<S> {
     pub eta: f32,
     /// Whether no other direction would do: a mirror's or a clear glass's.
     pub delta: bool,
+    /// Whether it goes straight on as if nothing were there, as through a hole.
+    pub null: bool,
 }
 
 /// A BSDF's value for two directions, without its delta parts.
@@ -88,6 +90,7 @@ impl<S> BsdfSample<S> {
             pdf: probability,
             eta: 1.0,
             delta: true,
+            null: true,
         }
     }
 }
@@ -102,6 +105,7 @@ impl<S: Spectral> BsdfValue<S> {
             pdf: self.pdf,
             eta,
             delta: false,
+            null: false,
         })
     }
 }

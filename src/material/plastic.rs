@@ -156,6 +156,7 @@ impl<C: ColorModel> Bsdf<C> for Plastic<C> {
                 pdf: probability,
                 eta: 1.0,
                 delta: true,
+                null: false,
             });
         }
         let wo = warp::cosine_hemisphere(u2);

@@ -62,6 +62,7 @@ impl<C: ColorModel> Bsdf<C> for ThinDielectric<C> {
                 pdf: reflectance,
                 eta: 1.0,
                 delta: true,
+                null: false,
             });
         }
         let weight = self.specular_transmittance.eval(at, w);

@@ -456,10 +456,10 @@ pub(super) fn report<C: ColorModel>(
     ladder: &Ladder,
     blocks: &Blocks,
 ) -> AdaptiveReport {
-    let (crop, limits) = (&job.view.film.crop, ladder.limits());
+    let (crop, limits) = (job.view.film.shown(), ladder.limits());
     let (mut samples, mut at_limit) = (0, 0);
     for (own, count) in blocks.counts() {
-        let seen = own.grown(0, crop);
+        let seen = own.grown(0, &crop);
         let pixels = u64::from(seen.width) * u64::from(seen.height);
         samples += pixels * u64::from(count);
         at_limit += if count == limits[1] { pixels } else { 0 };
@@ -478,7 +478,7 @@ pub(super) fn report<C: ColorModel>(
 pub(super) fn develop<C: ColorModel>(job: &Job<'_, C>, blocks: &Blocks) -> Result<Image> {
     let film = &job.view.film;
     let halves = blocks.halves(&job.channels())?;
-    let mut sums = Sums::new(film.crop, job.channels())?;
+    let mut sums = Sums::new(film.shown(), job.channels())?;
     for half in &halves {
         sums.add_film(half);
     }
@@ -491,7 +491,7 @@ pub(super) fn develop<C: ColorModel>(job: &Job<'_, C>, blocks: &Blocks) -> Resul
         data.extend_from_slice(pixel);
         data.extend([0.0, 0.0]);
     }
-    let crop = &film.crop;
+    let crop = &film.shown();
     for (own, samples) in blocks.counts() {
         let seen = own.grown(0, crop);
         if seen.width == 0 || seen.height == 0 {

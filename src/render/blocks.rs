@@ -5,7 +5,7 @@
 //! beyond the block as far as the filter does, and is divided by its number of samples when the film is
 //! put together. Blocks are aligned to the full film: a crop takes whole ones.
 
-use super::sums::{Accumulator, Sums, Tally, border, zeros};
+use super::sums::{Accumulator, Sums, Tally, zeros};
 use crate::error::Result;
 use crate::sensor::{Film, Window};
 
@@ -19,7 +19,7 @@ const HEAD: usize = 2;
 /// Where the blocks are.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Grid {
-    /// The full film.
+    /// All that can be sampled.
     film: Window,
     /// The blocks that the crop touches.
     shown: Window,
@@ -33,8 +33,8 @@ pub(super) struct Grid {
 impl Grid {
     /// For sums of so many channels.
     pub(super) fn new(film: &Film, channels: usize) -> Self {
-        let (full, border) = (film.full(), border(&film.filter));
-        let shown = whole_blocks(&film.crop, &full);
+        let (full, border) = (film.sampled(), film.filter.reach());
+        let shown = whole_blocks(&film.shown(), &full);
         Self {
             film: full,
             shown,

@@ -41,7 +41,7 @@ impl Sink for Counted {
 
 /// Traces the job's crop.
 pub(super) fn count<C: ColorModel>(job: &Job<'_, C>, progress: &dyn Progress) -> Result<Heat> {
-    let crop = &job.view.film.crop;
+    let crop = job.view.film.shown();
     let samples = job.view.sampler.sample_count().min(PASS);
     let (width, height) = (crop.width as usize, crop.height as usize);
     let mut node_steps: Vec<f32> = Vec::new();

@@ -6,7 +6,6 @@ use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
-use super::sums::border;
 use crate::sensor::{Film, Window};
 
 /// Pixels along a tile's side.
@@ -25,8 +24,8 @@ pub(super) struct Plan {
 
 impl Plan {
     pub(super) fn new(film: &Film, spp: u32) -> Self {
-        let full = film.full();
-        let needed = film.crop.grown(border(&film.filter), &full);
+        let full = film.sampled();
+        let needed = film.shown().grown(film.filter.reach(), &full);
         let tiles = tiles(&full, &needed);
         Self { needed, tiles, spp }
     }

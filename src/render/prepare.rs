@@ -17,7 +17,7 @@ use crate::color::ColorModel;
 use crate::description::{Description, Kind, NodeId, Properties};
 use crate::error::{Error, Problem, Problems, Result};
 use crate::image::{Metadata, Window};
-use crate::integrator::{self, Estimator, Integrator};
+use crate::integrator::{self, Estimator, Footprint, Integrator};
 use crate::mesh::ReadMesh;
 use crate::sampler::Sampler;
 use crate::scene::{self, Assets, Scene};
@@ -149,8 +149,16 @@ pub(super) fn view<C: ColorModel>(description: &Description, sensor: NodeId) -> 
         Some(child) => {
             let context = integrator::Context {
                 lights: scene::light_names(description),
+                footprint: sensor
+                    .as_ref()
+                    .zip(film.as_ref())
+                    .zip(sampler.as_ref())
+                    .map(|((sensor, film), sampler)| {
+                        Footprint::new(sensor.clone(), film, sampler.sample_count())
+                    }),
             };
             let integrator = problems.take(Integrator::build(&child, &context));
+            warnings.extend(problems.take(integrator::timeout_note(&child)).flatten());
             (integrator, child.plugin().to_owned())
         }
         None => (Some(Integrator::default()), "path".to_owned()),

@@ -112,7 +112,8 @@ fn camera_sample<C: ColorModel>(
         stream.seek(WAVELENGTH);
         stream.next_1d(sampler)
     });
-    let place = Vec2::new(x as f32 + offset.x, y as f32 + offset.y)
+    let margin = film.margin() as f32;
+    let place = Vec2::new(x as f32 - margin + offset.x, y as f32 - margin + offset.y)
         / Vec2::new(film.width as f32, film.height as f32);
     (
         Start {

@@ -136,7 +136,10 @@ impl Task for Render<'_> {
         report.stats = tally.stats;
         report.seconds.spend(&tally.times);
         report.dropped_samples = tally.dropped;
-        report.dropped_pixel = tally.dropped_pixel;
+        let margin = job.view.film.margin();
+        report.dropped_pixel = tally
+            .dropped_pixel
+            .map(|pixel| pixel.map(|place| place.saturating_sub(margin)));
         warnings.extend(tally.warning());
         let rendered = Rendered {
             image,

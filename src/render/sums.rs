@@ -8,17 +8,12 @@
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::color::luminance;
+use crate::color::{luminance, rgb_to_xyz};
 use crate::error::{Error, Problem, Result};
 use crate::filter::{Filter, MAX_RADIUS};
 use crate::image::Image;
 use crate::integrator::{Cost, Stats};
-use crate::sensor::{Film, PixelFormat, Window};
-
-/// How far beyond its own pixel a sample reaches.
-pub(super) fn border(filter: &Filter) -> u32 {
-    (filter.radius() + 0.5).ceil() as u32 - 1
-}
+use crate::sensor::{Coordinates, Film, Window};
 
 /// The most pixels along an axis that a sample reaches, as a multiple of four.
 const MAX_REACH: usize = (2 * (MAX_RADIUS as usize + 1) + 1).next_multiple_of(4);
@@ -243,13 +238,11 @@ impl Sums {
     /// Divides by the weights.
     pub(super) fn develop(&self, film: &Film) -> Result<Image> {
         let colors = self.channels.len() - 1;
-        let (mut names, extra) = (Vec::new(), &self.channels[3.min(colors)..colors]);
-        names.extend(match film.pixel_format {
-            PixelFormat::Luminance => vec!["Y".to_owned()],
-            PixelFormat::Rgb => self.channels[..3].to_vec(),
-            PixelFormat::Rgba => [&self.channels[..3], &["A".to_owned()]].concat(),
-        });
-        names.extend_from_slice(extra);
+        let extra = &self.channels[3.min(colors)..colors];
+        let format = film.pixel_format;
+        let main: Vec<&str> = format.channels().collect();
+        let names = main.iter().map(|name| String::from(*name));
+        let names: Vec<String> = names.chain(extra.iter().cloned()).collect();
         let stride = self.channels.len() + 1;
         let mut data = vec![0.0; self.data.len() / stride * names.len()];
         let pixels = data.par_chunks_exact_mut(names.len());
@@ -258,13 +251,17 @@ impl Sums {
             let scale = if pixel[0] > 0.0 { 1.0 / pixel[0] } else { 0.0 };
             let value = |c: usize| (pixel[c + 1] * scale) as f32;
             let rgb = [value(0), value(1), value(2)];
-            let (main, others) = out.split_at_mut(names.len() - extra.len());
-            match film.pixel_format {
-                PixelFormat::Luminance => main[0] = luminance(rgb),
-                PixelFormat::Rgb => main.copy_from_slice(&rgb),
-                PixelFormat::Rgba => {
-                    main.copy_from_slice(&[rgb[0], rgb[1], rgb[2], value(colors)]);
-                }
+            let (main, others) = out.split_at_mut(main.len());
+            let color = match format.colors {
+                Coordinates::Rgb => rgb,
+                Coordinates::Luminance => [luminance(rgb); 3],
+                Coordinates::Xyz => rgb_to_xyz(rgb),
+            };
+            for (out, value) in main.iter_mut().zip(color) {
+                *out = value;
+            }
+            if let (true, Some(alpha)) = (format.alpha, main.last_mut()) {
+                *alpha = value(colors);
             }
             for (other, c) in others.iter_mut().zip(3..) {
                 *other = value(c);
@@ -288,7 +285,7 @@ pub(super) fn splat(
         width: 1,
         height: 1,
     };
-    let reached = center.grown(border(filter), window);
+    let reached = center.grown(filter.reach(), window);
     let weights = |first: u32, own: u32, offset: f32, count: u32| {
         let mut weights = [0.0; MAX_REACH];
         // Relative to the sample's own pixel, so that they do not depend on where on the film it is; some more than

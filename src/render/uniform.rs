@@ -5,7 +5,7 @@ use super::plan::{Completed, Plan};
 use super::prepare::Job;
 use super::progress::{Phase, Progress};
 use super::samples::{self, Place, Sink};
-use super::sums::{Summed, Sums, Tally, border};
+use super::sums::{Summed, Sums, Tally};
 use super::unit;
 use crate::color::ColorModel;
 use crate::error::Result;
@@ -20,7 +20,7 @@ pub(super) fn render<C: ColorModel>(
 ) -> Result<(Summed<Sums>, Completed)> {
     let plan = Plan::new(&job.view.film, job.view.sampler.sample_count());
     let mut summed = Summed {
-        sums: Sums::new(job.view.film.crop, job.channels())?,
+        sums: Sums::new(job.view.film.shown(), job.channels())?,
         next: 0,
     };
     if let Some(keeper) = &mut keeper {
@@ -53,7 +53,7 @@ fn render_unit<C: ColorModel>(
     }
     let film = &job.view.film;
     let (tile, indices) = plan.unit(unit);
-    let reach = tile.grown(border(&film.filter), &film.full());
+    let reach = tile.grown(film.filter.reach(), &film.sampled());
     let sums = Sums::new(reach, job.channels()).expect("a tile is small");
     let mut sink = Splat(sums, &film.filter);
     let own = tile.grown(0, &plan.needed);

@@ -95,6 +95,11 @@ impl<C: ColorModel> Scene<C> {
         self.surfacing[at.shape as usize].light
     }
 
+    /// Whether the surface that was hit, if any, is a light.
+    pub fn gives_light(&self, hit: &Hit) -> bool {
+        !hit.is_miss() && self.surfacing[hit.shape as usize].light.is_some()
+    }
+
     /// Whether there is light all around.
     pub fn has_environment(&self) -> bool {
         self.environment.is_some()

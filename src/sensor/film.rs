@@ -1,5 +1,5 @@
-//! `hdrfilm`: size, crop window, pixel format and reconstruction filter; plain settings, for the sums
-//! themselves are kept by `render`.
+//! `hdrfilm`: size, crop window, pixel format, reconstruction filter, and whether samples beyond the edges count
+//! (`sample_border`); plain settings, for the sums themselves are kept by `render`.
 
 use crate::description::{Kind, Properties};
 use crate::error::Result;
@@ -47,15 +47,74 @@ impl Window {
     }
 }
 
+/// In which terms colours are written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Coordinates {
+    /// R, G, B: linear BT.709.
+    Rgb,
+    /// Y alone: luminance.
+    Luminance,
+    /// X, Y, Z: the CIE's of 1931.
+    Xyz,
+}
+
+impl Coordinates {
+    /// The names of the channels.
+    pub fn channels(self) -> &'static [&'static str] {
+        match self {
+            Self::Rgb => &["R", "G", "B"],
+            Self::Luminance => &["Y"],
+            Self::Xyz => &["X", "Y", "Z"],
+        }
+    }
+}
+
 /// Which channels the image gets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum PixelFormat {
+pub struct PixelFormat {
+    /// Those of colours.
+    pub colors: Coordinates,
+    /// Whether opacity follows, as A.
+    pub alpha: bool,
+}
+
+impl PixelFormat {
     /// R, G, B.
-    Rgb,
-    /// R, G, B and A, the fraction of samples that met something.
-    Rgba,
-    /// Y alone.
-    Luminance,
+    pub const RGB: Self = Self::new(Coordinates::Rgb, false);
+
+    /// All, as scene files name them.
+    const NAMED: [(&str, Self); 6] = [
+        ("luminance", Self::new(Coordinates::Luminance, false)),
+        ("luminance_alpha", Self::new(Coordinates::Luminance, true)),
+        ("rgb", Self::RGB),
+        ("rgba", Self::new(Coordinates::Rgb, true)),
+        ("xyz", Self::new(Coordinates::Xyz, false)),
+        ("xyza", Self::new(Coordinates::Xyz, true)),
+    ];
+
+    /// The names of the channels.
+    pub fn channels(self) -> impl Iterator<Item = &'static str> {
+        let colors = self.colors.channels().iter().copied();
+        colors.chain(self.alpha.then_some("A"))
+    }
+
+    const fn new(colors: Coordinates, alpha: bool) -> Self {
+        Self { colors, alpha }
+    }
+
+    fn build(properties: &Properties<'_>) -> Result<Self> {
+        const NAME: &str = "pixel_format";
+        let wanted = properties.string(NAME)?.unwrap_or("rgb").to_lowercase();
+        let names = Self::NAMED.map(|(name, _)| name);
+        match Self::NAMED.iter().find(|(name, _)| *name == wanted) {
+            Some((_, format)) => Ok(*format),
+            None => {
+                let error = properties.error(NAME, format!("unknown pixel format \"{wanted}\""));
+                let help = format!("there are {}", names.join(", "));
+                Err(error.suggest(&wanted, names).help(help))
+            }
+        }
+    }
 }
 
 /// The film's settings.
@@ -71,6 +130,8 @@ pub struct Film {
     pub pixel_format: PixelFormat,
     /// How samples reach pixels.
     pub filter: Filter,
+    /// Whether samples that lie beyond the film's edges count as far as the filter reaches.
+    pub sample_border: bool,
 }
 
 impl Default for Film {
@@ -87,8 +148,9 @@ impl Default for Film {
             width,
             height,
             crop,
-            pixel_format: PixelFormat::Rgb,
+            pixel_format: PixelFormat::RGB,
             filter: Filter::default(),
+            sample_border: false,
         }
     }
 }
@@ -111,6 +173,34 @@ impl Film {
             y: 0,
             width: self.width,
             height: self.height,
+        }
+    }
+
+    /// How many pixels beyond each edge are sampled. Where samples are, pixels are counted from the first one of those.
+    pub fn margin(&self) -> u32 {
+        if self.sample_border {
+            self.filter.reach()
+        } else {
+            0
+        }
+    }
+
+    /// All that can be sampled: the film with its margin.
+    pub fn sampled(&self) -> Window {
+        Window {
+            x: 0,
+            y: 0,
+            width: self.width + 2 * self.margin(),
+            height: self.height + 2 * self.margin(),
+        }
+    }
+
+    /// The crop's place in what can be sampled.
+    pub fn shown(&self) -> Window {
+        Window {
+            x: self.crop.x + self.margin(),
+            y: self.crop.y + self.margin(),
+            ..self.crop
         }
     }
 
@@ -169,24 +259,9 @@ impl Film {
                 .error("width", message)
                 .help("render it in crops"));
         }
-        let pixel_format = match properties.string("pixel_format")?.unwrap_or("rgb") {
-            "rgb" => PixelFormat::Rgb,
-            "rgba" => PixelFormat::Rgba,
-            "luminance" => PixelFormat::Luminance,
-            other => {
-                let error =
-                    properties.error("pixel_format", format!("unknown pixel format \"{other}\""));
-                return Err(error.help("there are rgb, rgba and luminance"));
-            }
-        };
+        let pixel_format = PixelFormat::build(properties)?;
         // How Mitsuba writes its file; what Étendue writes follows from the output's name.
-        for name in [
-            "file_format",
-            "component_format",
-            "banner",
-            "compensate",
-            "sample_border",
-        ] {
+        for name in ["file_format", "component_format", "banner", "compensate"] {
             properties.ignore(name);
         }
         let filter = match properties.child(Kind::Filter)? {
@@ -199,6 +274,7 @@ impl Film {
             crop,
             pixel_format,
             filter,
+            sample_border: properties.boolean("sample_border")?.unwrap_or(false),
         })
     }
 }

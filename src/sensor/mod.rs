@@ -13,7 +13,7 @@ use crate::family::family;
 use crate::interaction::Ray;
 use crate::math::Transform;
 
-pub use film::{Film, PixelFormat, Window};
+pub use film::{Coordinates, Film, PixelFormat, Window};
 pub(crate) use perspective::tangent_x;
 
 /// What every sensor does.
@@ -29,6 +29,9 @@ pub trait Camera: std::fmt::Debug + Send + Sync {
     fn world_to_camera(&self) -> Mat4;
     /// From camera space to clip space: x right and y up in [−1, 1], z in [0, 1] from near to far.
     fn projection(&self) -> Mat4;
+    /// The rays through the points of the film that lie a `step` (in units of the film, as in [`Camera::ray`]) further to
+    /// the right and further down than that of `ray`, which is one of this camera's.
+    fn neighbours(&self, ray: &Ray, step: Vec2) -> [Ray; 2];
     /// When the shutter is open: (open, close).
     fn shutter(&self) -> (f32, f32);
 }
@@ -73,6 +76,8 @@ impl Mount {
             let message = format!("far_clip ({far}) must be greater than near_clip ({near})");
             return Err(properties.error("far_clip", message));
         }
+        // Of effect where there is a lens; all cameras have it, so that one can be exchanged for another.
+        properties.float("focus_distance")?;
         let open = properties.float("shutter_open")?.unwrap_or(0.0);
         let close = properties.float("shutter_close")?.unwrap_or(open);
         if close < open {

@@ -33,6 +33,14 @@ impl Camera for Orthographic {
             .ray(p.extend(self.mount.near), p.extend(self.mount.far), time)
     }
 
+    fn neighbours(&self, ray: &Ray, step: Vec2) -> [Ray; 2] {
+        let way = -2.0 * step * self.half;
+        [Vec3::X * way.x, Vec3::Y * way.y].map(|way| Ray {
+            origin: ray.origin + self.mount.to_world.vector(way),
+            ..*ray
+        })
+    }
+
     fn world_to_camera(&self) -> Mat4 {
         self.mount.world_to_camera()
     }

@@ -1,8 +1,9 @@
 //! `perspective`: a pinhole. The field of view is `fov` in degrees along `fov_axis` (x, y, diagonal,
 //! smaller, larger), or follows from `focal_length` (50mm by default) as on 35 mm film, whose diagonal
-//! it takes. Geometry nearer than `near_clip` or beyond `far_clip` is not seen.
+//! it takes. `principal_point_offset_x` and `_y` (0) move the picture to the left and up, by that part of its width and
+//! height. Geometry nearer than `near_clip` or beyond `far_clip` is not seen.
 
-use glam::{Mat4, Vec2, Vec4};
+use glam::{Mat4, Vec2, Vec3, Vec4};
 
 use super::{Camera, Film, Mount};
 use crate::description::Properties;
@@ -15,7 +16,7 @@ pub struct Perspective {
     mount: Mount,
     /// Half the extent of the film at distance 1, in camera space.
     half: Vec2,
-    /// Shift of the image's centre, in fractions of the film.
+    /// How far the picture is moved to the left and up, in fractions of the film.
     principal_point: Vec2,
 }
 
@@ -74,26 +75,52 @@ pub(crate) fn tangent_x(properties: &Properties<'_>, aspect: f64) -> Result<f64>
 
 impl Perspective {
     pub(super) fn build(properties: &Properties<'_>, film: &Film) -> Result<Self> {
-        let tangent = tangent_x(properties, film.aspect())?;
         let shift = |name| Ok(properties.float(name)?.unwrap_or(0.0) as f32);
         Ok(Self {
-            mount: Mount::build(properties)?,
-            half: Vec2::new(tangent as f32, (tangent / film.aspect()) as f32),
             principal_point: Vec2::new(
                 shift("principal_point_offset_x")?,
                 shift("principal_point_offset_y")?,
             ),
+            ..Self::centred(properties, film)?
+        })
+    }
+
+    /// The camera whose axis goes through the middle of the picture.
+    pub(super) fn centred(properties: &Properties<'_>, film: &Film) -> Result<Self> {
+        let tangent = tangent_x(properties, film.aspect())?;
+        Ok(Self {
+            mount: Mount::build(properties)?,
+            half: Vec2::new(tangent as f32, (tangent / film.aspect()) as f32),
+            principal_point: Vec2::ZERO,
         })
     }
 
     /// The ray that leaves the camera-space point `lens` for where the pinhole's ray has depth `focus`.
     pub(super) fn ray_through(&self, film: Vec2, lens: Vec2, focus: f32, time: f32) -> Ray {
-        let p = (Vec2::ONE - 2.0 * (film - self.principal_point)) * self.half;
+        let p = (Vec2::ONE - 2.0 * (film + self.principal_point)) * self.half;
         // At depth 1; from the lens's centre it is the pinhole's own.
         let way = (p - lens / focus).extend(1.0);
         let start = lens.extend(0.0);
         let Mount { near, far, .. } = self.mount;
         self.mount.ray(start + way * near, start + way * far, time)
+    }
+
+    /// The rays beside `ray`, from points that lie by `spread` of the way between them beside its origin.
+    pub(super) fn rays_beside(&self, ray: &Ray, step: Vec2, spread: f32) -> [Ray; 2] {
+        let Mount { to_world, .. } = &self.mount;
+        let way = to_world.inverse().vector(ray.direction);
+        let way = way / way.z;
+        let steps = -2.0 * step * self.half;
+        [Vec3::X * steps.x, Vec3::Y * steps.y].map(|step| Ray {
+            origin: ray.origin + to_world.vector(step * spread),
+            direction: to_world.vector(way + step).normalize(),
+            ..*ray
+        })
+    }
+
+    /// The near clipping distance.
+    pub(super) fn near(&self) -> f32 {
+        self.mount.near
     }
 
     /// The far clipping distance.
@@ -107,6 +134,11 @@ impl Camera for Perspective {
         self.ray_through(film, Vec2::ZERO, 1.0, time)
     }
 
+    /// All begin where `ray` does, as in Mitsuba.
+    fn neighbours(&self, ray: &Ray, step: Vec2) -> [Ray; 2] {
+        self.rays_beside(ray, step, 0.0)
+    }
+
     fn world_to_camera(&self) -> Mat4 {
         self.mount.world_to_camera()
     }
@@ -118,8 +150,8 @@ impl Camera for Perspective {
             Vec4::new(-1.0 / self.half.x, 0.0, 0.0, 0.0),
             Vec4::new(0.0, 1.0 / self.half.y, 0.0, 0.0),
             Vec4::new(
-                2.0 * self.principal_point.x,
-                -2.0 * self.principal_point.y,
+                -2.0 * self.principal_point.x,
+                2.0 * self.principal_point.y,
                 depth,
                 1.0,
             ),
@@ -136,7 +168,6 @@ impl Camera for Perspective {
 mod tests {
     use super::*;
     use crate::description::{Description, Kind, Options};
-    use glam::Vec3;
     use std::path::Path;
 
     fn camera(inside: &str, film: &Film) -> Result<Perspective> {
@@ -183,7 +214,8 @@ mod tests {
             height: 100,
             ..Film::default()
         };
-        let inside = r#"<transform name="to_world"><lookat origin="1,2,3" target="4,0,1" up="0,0,1"/></transform>"#;
+        let inside = r#"<float name="principal_point_offset_x" value="0.1"/>
+            <float name="principal_point_offset_y" value="-0.25"/><transform name="to_world"><lookat origin="1,2,3" target="4,0,1" up="0,0,1"/></transform>"#;
         let camera = camera(inside, &film).unwrap();
         let place = Vec2::new(0.8, 0.3);
         let ray = camera.ray(place, Vec2::ZERO, 0.0);
@@ -192,6 +224,46 @@ mod tests {
             let ndc = clip.truncate() / clip.w;
             let expected = Vec3::new(2.0 * place.x - 1.0, 1.0 - 2.0 * place.y, depth);
             assert!((ndc - expected).length() < 2e-3, "{ndc} {expected}");
+        }
+    }
+
+    #[test]
+    fn the_principal_point_moves_the_picture_to_the_left_and_up() {
+        let film = Film {
+            width: 20,
+            height: 10,
+            ..Film::default()
+        };
+        let shifted = |x: f32, y: f32| {
+            let inside = format!(
+                r#"<float name="fov" value="40"/><float name="principal_point_offset_x" value="{x}"/>
+                <float name="principal_point_offset_y" value="{y}"/>"#
+            );
+            camera(&inside, &film).unwrap()
+        };
+        let (still, moved) = (shifted(0.0, 0.0), shifted(0.1, 0.2));
+        let place = Vec2::new(0.6, 0.7);
+        let before = still.ray(place, Vec2::ZERO, 0.0);
+        let after = moved.ray(place - Vec2::new(0.1, 0.2), Vec2::ZERO, 0.0);
+        assert!(before.direction.distance(after.direction) < 1e-6);
+    }
+
+    #[test]
+    fn neighbours_are_the_rays_of_the_places_beside() {
+        let film = Film {
+            width: 200,
+            height: 100,
+            ..Film::default()
+        };
+        let inside = r#"<transform name="to_world"><lookat origin="1,2,3" target="4,0,1" up="0,0,1"/></transform>"#;
+        let camera = camera(inside, &film).unwrap();
+        let (place, step) = (Vec2::new(0.8, 0.3), Vec2::new(0.01, 0.02));
+        let ray = camera.ray(place, Vec2::ZERO, 0.0);
+        let [right, down] = camera.neighbours(&ray, step);
+        for (neighbour, beside) in [(right, Vec2::X), (down, Vec2::Y)] {
+            let exact = camera.ray(place + step * beside, Vec2::ZERO, 0.0);
+            assert!(neighbour.direction.distance(exact.direction) < 1e-6);
+            assert_eq!(neighbour.origin, ray.origin);
         }
     }
 }

@@ -94,7 +94,7 @@ impl Aperture {
 
 impl ThinLens {
     pub(super) fn build(properties: &Properties<'_>, film: &Film) -> Result<Self> {
-        let pinhole = Perspective::build(properties, film)?;
+        let pinhole = Perspective::centred(properties, film)?;
         let focus_distance = match properties.float("focus_distance")? {
             Some(distance) if !(distance as f32 > 0.0 && (distance as f32).is_finite()) => {
                 return Err(properties.error(
@@ -118,6 +118,11 @@ impl Camera for ThinLens {
         let lens = self.aperture.point(lens);
         self.pinhole
             .ray_through(film, lens, self.focus_distance, time)
+    }
+
+    /// All go through one point of the lens.
+    fn neighbours(&self, ray: &Ray, step: Vec2) -> [Ray; 2] {
+        self.pinhole.rays_beside(ray, step, self.pinhole.near())
     }
 
     fn has_lens(&self) -> bool {
@@ -210,6 +215,38 @@ mod tests {
                 "{ray:?}"
             );
             assert!((ray.t_max - length).abs() < 1e-4, "{ray:?}");
+        }
+    }
+
+    #[test]
+    fn neighbours_go_through_the_same_point_of_the_lens() {
+        let camera = camera(
+            r#"<float name="aperture_radius" value="0.3"/><float name="focus_distance" value="2.5"/>
+            <float name="near_clip" value="0.5"/>"#,
+        )
+        .unwrap();
+        let (place, lens) = (Vec2::new(0.8, 0.3), Vec2::new(0.2, 0.9));
+        let step = Vec2::new(0.01, 0.02);
+        let ray = camera.ray(place, lens, 0.0);
+        let [right, down] = camera.neighbours(&ray, step);
+        for (neighbour, beside) in [(right, Vec2::X), (down, Vec2::Y)] {
+            let exact = camera.ray(place + step * beside, lens, 0.0);
+            assert!(neighbour.direction.distance(exact.direction) < 1e-6);
+            assert!(neighbour.origin.distance(exact.origin) < 1e-6);
+        }
+    }
+
+    #[test]
+    fn a_lens_has_no_principal_point() {
+        for name in ["principal_point_offset_x", "principal_point_offset_y"] {
+            let text = format!(
+                r#"<scene version="3.0.0"><sensor type="thinlens"><float name="aperture_radius" value="1"/>
+                <float name="{name}" value="0.1"/></sensor></scene>"#
+            );
+            let scene =
+                Description::parse(&text, Path::new("test.xml"), &Options::default()).unwrap();
+            ThinLens::build(&scene.root().children(Kind::Sensor)[0], &Film::default()).unwrap();
+            assert!(scene.unread()[0].to_string().contains(name));
         }
     }
 

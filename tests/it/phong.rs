@@ -150,6 +150,7 @@ fn seen(text: &str, targets: &[DVec3]) -> Vec<[f32; 3]> {
     let root = description.root();
     let context = Context {
         lights: light_names(&description),
+        ..Context::default()
     };
     let integrator = description.node(child(&root, Kind::Integrator));
     let integrator = Integrator::<Rgb>::build(&integrator, &context).unwrap();

@@ -1,0 +1,49 @@
+//! How fast texture coordinates change over the film (Igehy, *Tracing ray differentials*, 1999): the rays through the
+//! neighbouring points meet the plane that touches the surface, and the steps between these points are written, by
+//! least squares, as steps of u and v. As in Mitsuba a neighbour is a pixel away over the root of the samples in it.
+
+use glam::{DVec3, Vec2};
+
+use crate::interaction::{Interaction, Ray};
+use crate::sensor::{Film, Sensor};
+
+/// The camera, and how far apart its rays are.
+#[derive(Clone, Debug)]
+pub struct Footprint {
+    sensor: Sensor,
+    /// In units of the film.
+    step: Vec2,
+}
+
+impl Footprint {
+    /// Of so many samples a pixel.
+    pub fn new(sensor: Sensor, film: &Film, samples: u32) -> Self {
+        let pixel = Vec2::new(film.width as f32, film.height as f32).recip();
+        Self {
+            sensor,
+            step: pixel / (samples as f32).sqrt(),
+        }
+    }
+
+    /// The change of (u, v) from one ray to its neighbour to the right and to that below; 0 where there is none.
+    pub(super) fn duv(&self, ray: &Ray, at: &Interaction<'_>) -> [Vec2; 2] {
+        let [position, normal, dp_du, dp_dv] =
+            [at.position, at.normal, at.dp_du, at.dp_dv].map(|v| v.as_dvec3());
+        let neighbours = self.sensor.neighbours(ray, self.step);
+        neighbours.map(|neighbour| {
+            let (origin, direction) = (neighbour.origin.as_dvec3(), neighbour.direction.as_dvec3());
+            let t = normal.dot(position - origin) / normal.dot(direction);
+            let duv = in_terms_of(dp_du, dp_dv, origin + t * direction - position);
+            if duv.is_finite() { duv } else { Vec2::ZERO }
+        })
+    }
+}
+
+/// The coefficients of `a` and `b` that come nearest to `v`.
+fn in_terms_of(a: DVec3, b: DVec3, v: DVec3) -> Vec2 {
+    let (aa, ab, bb) = (a.dot(a), a.dot(b), b.dot(b));
+    let (av, bv) = (a.dot(v), b.dot(v));
+    let scale = (aa * bb - ab * ab).recip();
+    let (u, v) = (bb * av - ab * bv, aa * bv - ab * av);
+    Vec2::new((u * scale) as f32, (v * scale) as f32)
+}

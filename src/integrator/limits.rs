@@ -1,0 +1,136 @@
+//! What integrators read alike: how long a path may become and whether emitters are hidden. `max_depth` counts
+//! edges (1 is emission seen directly, 2 direct light, −1, the default, no limit). From `rr_depth` (5) on roulette
+//! lets a path live with probability min(max(throughput)·η², 0.95). With `hide_emitters` (false) the camera looks
+//! through surfaces that give light, and sees no surroundings.
+//!
+//! Every integrator of Mitsuba also reads `block_size`, `samples_per_pass` and `timeout` (seconds). They say how it
+//! divides its work, and have no effect here: tiles and passes are fixed, and what ends a render early is
+//! `--time-limit`, which says so.
+
+use crate::color::Spectral;
+use crate::description::Properties;
+use crate::error::{Problem, Result};
+
+/// Reads what every integrator has; whether it hides emitters.
+pub(super) fn hides_emitters(properties: &Properties<'_>) -> Result<bool> {
+    properties.integer("block_size")?;
+    properties.integer("samples_per_pass")?;
+    properties.float("timeout")?;
+    Ok(properties.boolean("hide_emitters")?.unwrap_or(false))
+}
+
+/// The note that `timeout` does not end the render, where the integrator has one.
+pub fn timeout_note(properties: &Properties<'_>) -> Result<Option<Problem>> {
+    let seconds = properties
+        .float("timeout")?
+        .filter(|seconds| *seconds > 0.0);
+    Ok(seconds.map(|seconds| {
+        let error = properties.error("timeout", "timeout does not end a render here");
+        let error = error.help(format!("--time-limit {seconds}s does"));
+        error.problems()[0].clone()
+    }))
+}
+
+/// How long a path may become.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Limits {
+    /// Edges; `u32::MAX` is no limit.
+    pub(super) max_depth: u32,
+    rr_depth: u32,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self {
+            max_depth: u32::MAX,
+            rr_depth: 5,
+        }
+    }
+}
+
+/// The longest life that roulette grants.
+const MAX_SURVIVAL: f32 = 0.95;
+
+impl Limits {
+    pub(super) fn build(properties: &Properties<'_>) -> Result<Self> {
+        let depth = |name: &'static str, default: i64, least: i64| {
+            let depth = properties.integer(name)?.unwrap_or(default);
+            if depth < least {
+                return Err(properties.error(
+                    name,
+                    format!("{name} must be at least {least}, and {depth} is not"),
+                ));
+            }
+            Ok(u32::try_from(depth).unwrap_or(u32::MAX))
+        };
+        Ok(Self {
+            max_depth: depth("max_depth", -1, -1)?,
+            rr_depth: depth("rr_depth", 5, 1)?,
+        })
+    }
+
+    /// Roulette after the bounce at `depth`: the throughput with which a path lives on, if it does. `draw` is asked for
+    /// a number in [0, 1) where that is left to chance.
+    pub(super) fn roulette<S: Spectral>(
+        &self,
+        depth: u32,
+        throughput: S,
+        eta: f32,
+        draw: impl FnOnce() -> f32,
+    ) -> Option<S> {
+        if throughput.is_black() {
+            return None;
+        }
+        if depth + 1 < self.rr_depth {
+            return Some(throughput);
+        }
+        let survival = (throughput.max_value() * eta * eta).min(MAX_SURVIVAL);
+        (draw() < survival).then(|| throughput / survival)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::color::Rgb;
+    use crate::description::{Description, Kind, Options};
+    use crate::integrator::{Context, Integrator};
+
+    fn integrator(name: &str, inside: &str) -> Description {
+        let nested = match name {
+            "moment" => "<integrator type='path'/>",
+            _ => "",
+        };
+        let text = format!(
+            "<scene version='3.0.0'><integrator type='{name}'>{inside}{nested}</integrator></scene>"
+        );
+        Description::parse(&text, Path::new("test.xml"), &Options::default()).unwrap()
+    }
+
+    #[test]
+    fn every_integrator_reads_what_mitsuba_s_do() {
+        let inside =
+            "<boolean name='hide_emitters' value='true'/><float name='timeout' value='30'/>
+            <integer name='block_size' value='16'/><integer name='samples_per_pass' value='4'/>";
+        for name in Integrator::<Rgb>::NAMES {
+            let scene = integrator(name, inside);
+            let properties = &scene.root().children(Kind::Integrator)[0];
+            Integrator::<Rgb>::build(properties, &Context::default())
+                .unwrap_or_else(|e| panic!("{name}: {e}"));
+            assert_eq!(scene.unread(), [], "{name}");
+            let note = timeout_note(properties).unwrap().unwrap();
+            assert!(note.to_string().contains("timeout does not end"), "{note}");
+        }
+    }
+
+    #[test]
+    fn a_timeout_that_is_none_is_not_worth_a_word() {
+        for inside in ["", "<float name='timeout' value='-1'/>"] {
+            let scene = integrator("path", inside);
+            let properties = &scene.root().children(Kind::Integrator)[0];
+            assert_eq!(timeout_note(properties).unwrap(), None);
+        }
+    }
+}
