@@ -2,14 +2,15 @@
 //!
 //! A family is a trait (what every member can do) and an enum (all the members there are). The enum
 //! derefs to the trait, so a member is called as `sampler.set_size()` and nobody writes a match by hand.
-//! A new member is one file and two lines: `mod x;` and a row in the table.
+//! A new member is one file and two lines: `mod x;` and a row in the table. It declares a `PLUGIN`, the table of its
+//! properties, and has a `build`, which reads them.
 
 /// Declares the enum of a plugin family. `$context` is what a member's `build` is given besides its
 /// properties.
 macro_rules! family {
     (
         $(#[$meta:meta])*
-        $vis:vis enum $family:ident $(<$color:ident>)? : $interface:ident, kind $kind:literal, context $context:ty {
+        $vis:vis enum $family:ident $(<$color:ident>)? : $interface:ident, context $context:ty {
             $($name:literal => $member:ident($type:ty)),+ $(,)?
         }
     ) => {
@@ -20,18 +21,18 @@ macro_rules! family {
         }
 
         impl $(<$color: crate::color::ColorModel>)? $family $(<$color>)? {
-            /// The names of the members, as scene files write them.
-            $vis const NAMES: &'static [&'static str] = &[$($name),+];
+            /// The members' names, as scene files write them, and what they declare.
+            $vis const PLUGINS: crate::description::declared::Plugins = &[$(($name, &<$type>::PLUGIN)),+];
 
             /// Builds the member that `properties` names; an unknown name is an error with a suggestion.
             $vis fn build(
                 properties: &crate::description::Properties<'_>,
                 context: &$context,
             ) -> crate::error::Result<Self> {
-                crate::family::check_strict(properties, $kind, Self::NAMES)?;
+                let properties = &crate::family::declared(properties, Self::PLUGINS.iter().copied())?;
                 match properties.plugin() {
                     $($name => Ok(Self::$member(<$type>::build(properties, context)?)),)+
-                    other => Err(crate::family::unknown(properties, $kind, other, Self::NAMES)),
+                    _ => unreachable!("a declared plugin is a member"),
                 }
             }
         }
@@ -50,6 +51,7 @@ macro_rules! family {
 
 pub(crate) use family;
 
+use crate::description::declared::Plugin;
 use crate::description::properties::STRICT;
 use crate::description::{Kind, Properties};
 use crate::error::{Error, Result};
@@ -195,7 +197,7 @@ const MITSUBA: &[(Kind, &[&str])] = &[
 ];
 
 /// Whether Mitsuba has a plugin of that name; its textures and spectra are one family.
-fn is_mitsubas(kind: Kind, name: &str) -> bool {
+pub(crate) fn is_mitsubas(kind: Kind, name: &str) -> bool {
     let alike = |k: Kind| match k {
         Kind::Spectrum => Kind::Texture,
         other => other,
@@ -205,31 +207,39 @@ fn is_mitsubas(kind: Kind, name: &str) -> bool {
         .any(|(k, plugins)| alike(*k) == alike(kind) && plugins.contains(&name))
 }
 
-/// Refuses a plugin that is Étendue's own, one of `names` but none of Mitsuba's, where the scene is read
-/// strictly.
-pub(crate) fn check_strict(properties: &Properties<'_>, kind: &str, names: &[&str]) -> Result<()> {
-    let name = properties.plugin();
-    if !properties.is_strict() || !names.contains(&name) || is_mitsubas(properties.kind(), name) {
-        return Ok(());
+/// The properties as the plugin sees them that they name.
+///
+/// # Errors
+/// Where there is no such plugin, or it is Étendue's own and the scene is read strictly.
+pub(crate) fn declared<'a>(
+    properties: &Properties<'a>,
+    plugins: impl Iterator<Item = (&'static str, &'static Plugin)> + Clone,
+) -> Result<Properties<'a>> {
+    let (kind, name) = (properties.kind(), properties.plugin());
+    let Some((_, plugin)) = plugins.clone().find(|(known, _)| *known == name) else {
+        return Err(unknown(properties, plugins.map(|(name, _)| name)));
+    };
+    if properties.is_strict() && !is_mitsubas(kind, name) {
+        let error = Error::input(format!("{kind} {name:?} is Étendue's own"));
+        return Err(error.at(properties.location()).help(STRICT));
     }
-    let error = Error::input(format!("{kind} {name:?} is Étendue's own"));
-    Err(error.at(properties.location()).help(STRICT))
+    Ok(properties.declared(plugin))
 }
 
 /// The error for a plugin that its family does not have.
-pub(crate) fn unknown(
+fn unknown(
     properties: &Properties<'_>,
-    kind: &str,
-    name: &str,
-    names: &[&str],
+    names: impl Iterator<Item = &'static str> + Clone,
 ) -> Error {
-    let error = if is_mitsubas(properties.kind(), name) {
+    let (kind, name) = (properties.kind(), properties.plugin());
+    let error = if is_mitsubas(kind, name) {
         Error::unsupported(format!(
-            "{kind} \"{name}\" exists in Mitsuba but not in Étendue"
+            "{kind} {name:?} exists in Mitsuba but not in Étendue"
         ))
     } else {
-        Error::input(format!("unknown {kind} \"{name}\"")).suggest(name, names.iter().copied())
+        Error::input(format!("unknown {kind} {name:?}")).suggest(name, names.clone())
     };
+    let names: Vec<&str> = names.collect();
     error
         .at(properties.location())
         .help(format!("there are {}", names.join(", ")))

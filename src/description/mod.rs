@@ -1,8 +1,9 @@
 //! The scene file as it was written: Mitsuba 3's XML becomes a flat list of nodes, each a plugin's kind,
 //! type, id and located properties, with parameters, includes, references and versions already dealt
-//! with. Nothing here knows what a plugin is; the families read their properties through
-//! [`Properties`], which remembers what was asked for, so that what nobody read can be reported.
+//! with. Nothing here knows what a plugin is; the families declare tables of properties ([`declared`]) and read
+//! them through [`Properties`].
 
+pub mod declared;
 pub mod properties;
 
 mod canonical;
@@ -21,11 +22,8 @@ mod xml;
 #[cfg(test)]
 mod tests;
 
-use std::collections::BTreeSet;
 use std::fmt;
 use std::path::Path;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use glam::{DMat4, DVec3};
 
@@ -33,7 +31,7 @@ pub use self::canonical::{Canonical, Part};
 pub use self::properties::Properties;
 use self::reader::Reader;
 use self::resolve::Scopes;
-use crate::error::{Error, Location, Problem, Result};
+use crate::error::{Location, Problem, Result};
 
 /// A node's place in its [`Description`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -152,7 +150,7 @@ pub enum Spectrum {
 }
 
 /// One property of a node.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Property {
     /// Its name; empty for a nested plugin without one.
     pub name: String,
@@ -162,7 +160,6 @@ pub struct Property {
     pub location: Location,
     /// The folders that a file named by it is looked for in.
     scope: u32,
-    read: AtomicBool,
 }
 
 impl Property {
@@ -172,18 +169,12 @@ impl Property {
             value,
             location,
             scope,
-            read: AtomicBool::new(false),
         }
-    }
-
-    /// Notes that somebody made use of it.
-    pub fn mark_read(&self) {
-        self.read.store(true, Ordering::Relaxed);
     }
 }
 
 /// One plugin's description.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct Node {
     kind: Kind,
     plugin: String,
@@ -191,10 +182,6 @@ struct Node {
     location: Location,
     /// In file order.
     properties: Vec<Property>,
-    /// The names that were asked for, to suggest one of them for a misspelt property.
-    asked: Mutex<BTreeSet<&'static str>>,
-    /// Whether anything was asked, be it by name or by kind.
-    visited: AtomicBool,
 }
 
 impl Node {
@@ -205,8 +192,6 @@ impl Node {
             id: None,
             location,
             properties: Vec::new(),
-            asked: Mutex::default(),
-            visited: AtomicBool::new(false),
         }
     }
 }
@@ -224,7 +209,7 @@ pub struct Options {
 }
 
 /// A scene file with everything it includes, as a flat list of nodes.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Description {
     nodes: Vec<Node>,
     scopes: Scopes,
@@ -264,47 +249,5 @@ impl Description {
     /// Things that are right but worth knowing, such as an upgrade from an older version of the format.
     pub fn warnings(&self) -> &[Problem] {
         &self.warnings
-    }
-
-    /// Every property and nested plugin that nobody has read, of the nodes that were asked for anything at all.
-    /// Plugins at the top of the scene that carry an id are no problem: they may be there to be referred to.
-    pub fn unread(&self) -> Vec<Problem> {
-        let mut problems = Vec::new();
-        for (index, node) in self.nodes.iter().enumerate() {
-            if !node.visited.load(Ordering::Relaxed) {
-                continue;
-            }
-            for property in &node.properties {
-                let referable = index == NodeId::ROOT.index() && self.has_id(property);
-                if !property.read.load(Ordering::Relaxed) && !referable {
-                    problems.extend_from_slice(self.unread_property(node, property).problems());
-                }
-            }
-        }
-        problems
-    }
-
-    fn has_id(&self, property: &Property) -> bool {
-        matches!(property.value, Value::Object(id) if self.nodes[id.index()].id.is_some())
-    }
-
-    fn unread_property(&self, node: &Node, property: &Property) -> Error {
-        let Node { kind, plugin, .. } = node;
-        let name = property.name.as_str();
-        match property.value {
-            Value::Object(id) if name.is_empty() => {
-                let child = &self.nodes[id.index()];
-                Error::input(format!(
-                    "{kind} {plugin:?} has no use for the {} {:?}",
-                    child.kind, child.plugin
-                ))
-            }
-            _ => {
-                let asked = node.asked.lock().unwrap_or_else(|e| e.into_inner());
-                Error::input(format!("{kind} {plugin:?} has no property {name:?}"))
-                    .suggest(name, asked.iter().copied())
-            }
-        }
-        .at(&property.location)
     }
 }

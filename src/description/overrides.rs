@@ -14,18 +14,15 @@ impl Description {
         properties.push(Property::new(name, value, command_line(), 0));
     }
 
-    /// Makes a node another plugin of its kind; the properties that the file gave the old one count as
-    /// read, for the new one may not know them.
-    pub fn replace(&mut self, id: NodeId, plugin: &str) {
+    /// Makes a node another plugin of its kind, which keeps those of the old one's properties that it `knows`.
+    pub fn replace(&mut self, id: NodeId, plugin: &str, knows: impl Fn(&Property) -> bool) {
         let node = &mut self.nodes[id.index()];
         plugin.clone_into(&mut node.plugin);
         node.location = command_line();
-        for property in &node.properties {
-            property.mark_read();
-        }
+        node.properties.retain(knows);
     }
 
-    /// The nested plugins of a kind, in file order. Nothing counts as read by it.
+    /// The nested plugins of a kind, in file order.
     pub fn children_of(&self, parent: NodeId, kind: Kind) -> Vec<NodeId> {
         let nested = |property: &Property| match property.value {
             Value::Object(id) if self.nodes[id.index()].kind == kind => Some(id),
@@ -35,7 +32,7 @@ impl Description {
         properties.iter().filter_map(nested).collect()
     }
 
-    /// What a node's property holds. It does not count as read by it.
+    /// What a node's property holds.
     pub fn get(&self, id: NodeId, name: &str) -> Option<&Value> {
         let properties = &self.nodes[id.index()].properties;
         let property = properties.iter().find(|p| p.name == name);

@@ -1,25 +1,161 @@
-//! One node as the plugin that is built from it sees it: typed access to its properties by name. Whatever
-//! is asked for counts as read, present or not, and a value of the wrong type is an error that points at
-//! it.
+//! One node as the plugin that is built from it sees it: typed access to its properties by name. What is absent
+//! has the value that the plugin's table declares, and a value of the wrong type or out of its range is an error that
+//! points at it.
 
 use std::path::PathBuf;
-use std::sync::atomic::Ordering;
 
 use glam::{DMat4, DVec3};
 
+use super::declared::{Plugin, Preset, Row, Takes};
 use super::{Description, Kind, Node, NodeId, Property, Value};
 use crate::error::{Error, Location, Result};
 
 /// Why what is Étendue's own is refused.
 pub(crate) const STRICT: &str = "Mitsuba 3 would not read it, which --strict refuses";
 
-/// A view of one node, which records what was read. Every typed question answers `Ok(None)` where the property is
-/// absent and an error at the property where it is of another type.
+/// A view of one node, with the table of the plugin that reads it.
 #[derive(Clone, Copy, Debug)]
 pub struct Properties<'a> {
     description: &'a Description,
     id: NodeId,
     node: &'a Node,
+    table: Option<&'static Plugin>,
+}
+
+/// A type that a property's value can have.
+pub trait FromValue<'a>: Sized {
+    /// The type in words, as in "expected a float".
+    const EXPECTED: &'static str;
+
+    /// The value, if it is of this type.
+    fn from_value(value: &'a Value) -> Option<Self>;
+
+    /// What a table declares, if it is of this type.
+    fn from_preset(preset: &Preset) -> Option<Self>;
+
+    /// The number that is held against a row's range.
+    fn number(&self) -> Option<f64> {
+        None
+    }
+}
+
+impl FromValue<'_> for bool {
+    const EXPECTED: &'static str = "a boolean";
+
+    fn from_value(value: &Value) -> Option<Self> {
+        match *value {
+            Value::Boolean(b) => Some(b),
+            _ => None,
+        }
+    }
+
+    fn from_preset(preset: &Preset) -> Option<Self> {
+        match *preset {
+            Preset::Boolean(b) => Some(b),
+            _ => None,
+        }
+    }
+}
+
+impl FromValue<'_> for i64 {
+    const EXPECTED: &'static str = "an integer";
+
+    fn from_value(value: &Value) -> Option<Self> {
+        match *value {
+            Value::Integer(i) => Some(i),
+            _ => None,
+        }
+    }
+
+    fn from_preset(preset: &Preset) -> Option<Self> {
+        match *preset {
+            Preset::Integer(i) => Some(i),
+            _ => None,
+        }
+    }
+
+    fn number(&self) -> Option<f64> {
+        Some(*self as f64)
+    }
+}
+
+impl FromValue<'_> for f64 {
+    const EXPECTED: &'static str = "a float";
+
+    /// Always finite.
+    fn from_value(value: &Value) -> Option<Self> {
+        match *value {
+            Value::Float(x) => Some(x),
+            Value::Integer(i) => Some(i as f64),
+            _ => None,
+        }
+    }
+
+    fn from_preset(preset: &Preset) -> Option<Self> {
+        match *preset {
+            Preset::Float(x) => Some(x),
+            _ => None,
+        }
+    }
+
+    fn number(&self) -> Option<f64> {
+        Some(*self)
+    }
+}
+
+impl<'a> FromValue<'a> for &'a str {
+    const EXPECTED: &'static str = "a string";
+
+    fn from_value(value: &'a Value) -> Option<Self> {
+        match value {
+            Value::String(s) => Some(s.as_str()),
+            _ => None,
+        }
+    }
+
+    fn from_preset(preset: &Preset) -> Option<Self> {
+        match *preset {
+            Preset::Text(text) => Some(text),
+            _ => None,
+        }
+    }
+}
+
+impl FromValue<'_> for DVec3 {
+    const EXPECTED: &'static str = "a point or a vector";
+
+    fn from_value(value: &Value) -> Option<Self> {
+        match *value {
+            Value::Vector(v) => Some(v),
+            _ => None,
+        }
+    }
+
+    fn from_preset(preset: &Preset) -> Option<Self> {
+        match *preset {
+            Preset::Vector(v) => Some(v.into()),
+            _ => None,
+        }
+    }
+}
+
+impl FromValue<'_> for DMat4 {
+    const EXPECTED: &'static str = "a transform";
+
+    /// Affine and invertible.
+    fn from_value(value: &Value) -> Option<Self> {
+        match *value {
+            Value::Transform(m) => Some(m),
+            _ => None,
+        }
+    }
+
+    fn from_preset(preset: &Preset) -> Option<Self> {
+        match preset {
+            Preset::Identity => Some(Self::IDENTITY),
+            _ => None,
+        }
+    }
 }
 
 impl<'a> Properties<'a> {
@@ -29,6 +165,16 @@ impl<'a> Properties<'a> {
             description,
             id,
             node,
+            table: None,
+        }
+    }
+
+    /// The same node as the plugin sees it that has this table.
+    #[must_use]
+    pub fn declared(self, table: &'static Plugin) -> Self {
+        Self {
+            table: Some(table),
+            ..self
         }
     }
 
@@ -42,30 +188,9 @@ impl<'a> Properties<'a> {
         self.node.kind
     }
 
-    /// The plugin's name: the tag's `type`, and `"scene"` for the root. Whoever asks is taken to build the plugin, even
-    /// where that has no properties.
+    /// The plugin's name: the tag's `type`, and `"scene"` for the root.
     pub fn plugin(&self) -> &'a str {
-        self.node.visited.store(true, Ordering::Relaxed);
         &self.node.plugin
-    }
-
-    /// The plugin's name, asked by somebody who does not build it.
-    pub fn peek_plugin(&self) -> &'a str {
-        &self.node.plugin
-    }
-
-    /// The nested plugins of that kind, asked by somebody who does not build them: none counts as read.
-    pub fn peek_children(&self, kind: Kind) -> impl Iterator<Item = Properties<'a>> {
-        let description = self.description;
-        let children = self
-            .node
-            .properties
-            .iter()
-            .filter_map(move |p| match p.value {
-                Value::Object(id) => Some(description.node(id)),
-                _ => None,
-            });
-        children.filter(move |child| child.kind() == kind)
     }
 
     /// The name that references use.
@@ -78,58 +203,116 @@ impl<'a> Properties<'a> {
         &self.node.location
     }
 
-    /// A `<boolean>`.
-    pub fn boolean(&self, name: &'static str) -> Result<Option<bool>> {
-        self.typed(name, "a boolean", |value| match *value {
-            Value::Boolean(b) => Some(b),
-            _ => None,
-        })
+    /// The row that the plugin's table has for the property; none where nobody has said which plugin reads it.
+    ///
+    /// # Panics
+    /// Where a plugin reads what it has not declared, which the families' tests would see.
+    fn row(&self, name: &str) -> Option<&'static Row> {
+        let row = self.table?.row(name);
+        assert!(
+            row.is_some(),
+            "{} {:?} reads {name:?}, which it does not declare",
+            self.kind(),
+            self.plugin()
+        );
+        row
     }
 
-    /// An `<integer>`.
-    pub fn integer(&self, name: &'static str) -> Result<Option<i64>> {
-        self.typed(name, "an integer", |value| match *value {
-            Value::Integer(i) => Some(i),
-            _ => None,
-        })
+    /// The value that the scene gives, checked against the range that is declared.
+    ///
+    /// # Errors
+    /// At the property where it is of another type or out of range.
+    pub fn given<T: FromValue<'a>>(&self, name: &str) -> Result<Option<T>> {
+        let row = self.row(name);
+        let Some(value) = self.typed(name, T::EXPECTED, T::from_value)? else {
+            return Ok(None);
+        };
+        let outside = row.zip(value.number());
+        match outside.filter(|(row, number)| !row.range.contains(*number)) {
+            Some((row, number)) => {
+                let message = format!("{name} must be {}, and {number} is not", row.range);
+                Err(self.error(name, message))
+            }
+            None => Ok(Some(value)),
+        }
     }
 
-    /// A `<float>` or an `<integer>`, always finite.
-    pub fn float(&self, name: &'static str) -> Result<Option<f64>> {
-        self.typed(name, "a float", |value| match *value {
-            Value::Float(x) => Some(x),
-            Value::Integer(i) => Some(i as f64),
-            _ => None,
-        })
+    /// The value that the scene gives, or else the declared one.
+    ///
+    /// # Errors
+    /// As [`Properties::given`]; and where there has to be a value and is none.
+    fn get<T: FromValue<'a>>(&self, name: &str) -> Result<T> {
+        if let Some(value) = self.given(name)? {
+            return Ok(value);
+        }
+        T::from_preset(&self.preset(name)).ok_or_else(|| self.missing(name))
     }
 
-    /// A `<string>`.
-    pub fn string(&self, name: &'static str) -> Result<Option<&'a str>> {
-        self.typed(name, "a string", |value| match value {
-            Value::String(s) => Some(s.as_str()),
-            _ => None,
-        })
+    /// What is declared for the property where a scene does not give it.
+    pub fn preset(&self, name: &str) -> Preset {
+        self.row(name).map_or(Preset::Required, |row| row.preset)
     }
 
-    /// A `<point>` or a `<vector>`.
-    pub fn vector(&self, name: &'static str) -> Result<Option<DVec3>> {
-        self.typed(name, "a point or a vector", |value| match *value {
-            Value::Vector(v) => Some(v),
-            _ => None,
-        })
+    /// The error where a property has to be given and is not.
+    pub fn missing(&self, name: &str) -> Error {
+        let message = format!("{} {:?} needs {name:?}", self.kind(), self.plugin());
+        let error = self.error("", message);
+        match self.row(name) {
+            Some(row) => error.help(format!("{name} ({}): {}", row.takes, row.about)),
+            None => error,
+        }
     }
 
-    /// A `<transform>`: affine and invertible.
-    pub fn transform(&self, name: &'static str) -> Result<Option<DMat4>> {
-        self.typed(name, "a transform", |value| match *value {
-            Value::Transform(m) => Some(m),
-            _ => None,
+    /// A `<boolean>`, or the declared one.
+    pub fn boolean(&self, name: &str) -> Result<bool> {
+        self.get(name)
+    }
+
+    /// An `<integer>`, or the declared one.
+    pub fn integer(&self, name: &str) -> Result<i64> {
+        self.get(name)
+    }
+
+    /// A `<float>` or an `<integer>`, or the declared one; finite.
+    pub fn float(&self, name: &str) -> Result<f64> {
+        self.get(name)
+    }
+
+    /// A `<string>`, or the declared one.
+    pub fn string(&self, name: &str) -> Result<&'a str> {
+        self.get(name)
+    }
+
+    /// A `<point>` or a `<vector>`, or the declared one.
+    pub fn vector(&self, name: &str) -> Result<DVec3> {
+        self.get(name)
+    }
+
+    /// A `<transform>`, affine and invertible, or the declared one.
+    pub fn transform(&self, name: &str) -> Result<DMat4> {
+        self.get(name)
+    }
+
+    /// The one of the declared choices that a `<string>` names, in upper or lower case.
+    ///
+    /// # Errors
+    /// Where it is none of them.
+    pub fn choice(&self, name: &str) -> Result<&'static str> {
+        let Some(Takes::Choice(choices)) = self.row(name).map(|row| row.takes) else {
+            panic!("{name:?} is declared as no choice");
+        };
+        let chosen: &str = self.get(name)?;
+        let same = |choice: &&&str| choice.eq_ignore_ascii_case(chosen);
+        choices.iter().find(same).copied().ok_or_else(|| {
+            self.error(name, format!("unknown {name} {chosen:?}"))
+                .suggest(chosen, choices.iter().copied())
+                .help(format!("there are {}", choices.join(", ")))
         })
     }
 
     /// An `<animation>`: (time, transform), times strictly increasing. A `<transform>` counts as one keyframe at
     /// time 0.
-    pub fn animation(&self, name: &'static str) -> Result<Option<Vec<(f64, DMat4)>>> {
+    pub fn animation(&self, name: &str) -> Result<Option<Vec<(f64, DMat4)>>> {
         self.typed(name, "an animation or a transform", |value| match *value {
             Value::Animation(ref keyframes) => Some(keyframes.clone()),
             Value::Transform(m) => Some(vec![(0.0, m)]),
@@ -139,30 +322,29 @@ impl<'a> Properties<'a> {
 
     /// The existing file that a `<string>` names, looked for in the `<path>` folders, then in the folder of the scene
     /// file that it stands in, then in those of the files that include that one, then in the working directory.
-    pub fn file(&self, name: &'static str) -> Result<Option<PathBuf>> {
-        let Some(file) = self.string(name)? else {
-            return Ok(None);
-        };
+    ///
+    /// # Errors
+    /// Where the scene names none, or one that is not there.
+    pub fn file(&self, name: &str) -> Result<PathBuf> {
+        let file = self.string(name)?;
         let scope = self.find(name).map_or(0, |property| property.scope);
         match self.description.scopes.find(scope, file) {
             Ok(path) if path.is_dir() => {
                 Err(self.error(name, format!("{} is a folder", path.display())))
             }
-            Ok(path) => Ok(Some(path)),
+            Ok(path) => Ok(path),
             Err(error) => Err(self.at(name, error)),
         }
     }
 
     /// The property, whatever it holds.
-    pub fn value(&self, name: &'static str) -> Option<&'a Property> {
-        self.ask(name);
-        let property = self.find(name)?;
-        property.mark_read();
-        Some(property)
+    pub fn value(&self, name: &str) -> Option<&'a Property> {
+        self.row(name);
+        self.find(name)
     }
 
     /// A nested plugin of that name, or the one that a reference of that name stands for.
-    pub fn object(&self, name: &'static str) -> Result<Option<Properties<'a>>> {
+    pub fn object(&self, name: &str) -> Result<Option<Properties<'a>>> {
         let description = self.description;
         self.typed(name, "a nested plugin", |value| match *value {
             Value::Object(id) => Some(description.node(id)),
@@ -172,18 +354,12 @@ impl<'a> Properties<'a> {
 
     /// The nested plugins of that kind, named or not, in file order.
     pub fn children(&self, kind: Kind) -> Vec<Properties<'a>> {
-        self.node.visited.store(true, Ordering::Relaxed);
-        let mut children = Vec::new();
-        for property in &self.node.properties {
-            if let Value::Object(id) = property.value {
-                let child = self.description.node(id);
-                if child.kind() == kind {
-                    property.mark_read();
-                    children.push(child);
-                }
-            }
-        }
-        children
+        let nested = |property: &Property| match property.value {
+            Value::Object(id) => Some(self.description.node(id)),
+            _ => None,
+        };
+        let children = self.node.properties.iter().filter_map(nested);
+        children.filter(|child| child.kind() == kind).collect()
     }
 
     /// The nested object of a kind, of which there can be one.
@@ -202,10 +378,8 @@ impl<'a> Properties<'a> {
         }
     }
 
-    /// All properties in file order, for plugins whose property names are the user's. None counts as read by it: see
-    /// [`Property::mark_read`].
+    /// All properties in file order.
     pub fn all(&self) -> &'a [Property] {
-        self.node.visited.store(true, Ordering::Relaxed);
         &self.node.properties
     }
 
@@ -214,33 +388,7 @@ impl<'a> Properties<'a> {
         self.description.strict
     }
 
-    /// Says of properties, before they are asked for, that they are Étendue's own.
-    ///
-    /// # Errors
-    /// At the first that is there, where the scene is read strictly.
-    pub fn own(&self, names: &[&str]) -> Result<()> {
-        let present = |name: &&&str| self.is_strict() && self.has(name);
-        match names.iter().find(present) {
-            None => Ok(()),
-            Some(name) => Err(self
-                .error(
-                    name,
-                    format!(
-                        "property {name:?} of {} {:?} is Étendue's own",
-                        self.kind(),
-                        self.plugin()
-                    ),
-                )
-                .help(STRICT)),
-        }
-    }
-
-    /// Counts the property as read without using it.
-    pub fn ignore(&self, name: &'static str) {
-        self.value(name);
-    }
-
-    /// Whether the property is there; this does not count as reading it.
+    /// Whether the property is there.
     pub fn has(&self, name: &str) -> bool {
         self.find(name).is_some()
     }
@@ -260,19 +408,13 @@ impl<'a> Properties<'a> {
         self.node.properties.iter().find(|p| p.name == name)
     }
 
-    fn ask(&self, name: &'static str) {
-        self.node.visited.store(true, Ordering::Relaxed);
-        let mut asked = self.node.asked.lock().unwrap_or_else(|e| e.into_inner());
-        asked.insert(name);
-    }
-
     fn typed<T>(
         &self,
-        name: &'static str,
+        name: &str,
         expected: &str,
         of: impl Fn(&'a Value) -> Option<T>,
     ) -> Result<Option<T>> {
-        let Some(property) = self.value(name) else {
+        let Some(property) = self.find(name) else {
             return Ok(None);
         };
         let found = || match property.value {
@@ -304,6 +446,24 @@ mod tests {
 
     use super::*;
     use crate::description::Options;
+    use crate::description::declared::{choice, file, float, integer, string};
+
+    static TABLE: Plugin = Plugin {
+        about: "a plugin of these tests",
+        properties: &[&[
+            float("radius", 1.5, "").positive(),
+            float("height", 0.0, "").required(),
+            float("i", 0.0, ""),
+            integer("x", 0, ""),
+            string("name", "nobody", ""),
+            choice("side", &["Left", "right"], ""),
+            file("filename", "the mesh"),
+        ]],
+    };
+
+    fn shape(scene: &Description) -> Properties<'_> {
+        scene.root().children(Kind::Shape)[0].declared(&TABLE)
+    }
 
     fn scene(text: &str) -> Description {
         let text = format!("<scene version='3.0.0'>{text}</scene>");
@@ -314,12 +474,12 @@ mod tests {
     #[test]
     fn a_value_of_another_type_is_named_and_located() {
         let scene = scene("\n<shape type='sphere'>\n  <string name='radius' value='x'/></shape>");
-        let sphere = scene.root().children(Kind::Shape)[0];
+        let sphere = shape(&scene);
         assert_eq!(
             sphere.float("radius").unwrap_err().to_string(),
             "test.xml:3:3: property \"radius\": expected a float, found a string"
         );
-        assert!(sphere.float("height").unwrap().is_none());
+        assert_eq!(sphere.given::<f64>("height").unwrap(), None);
     }
 
     #[test]
@@ -334,8 +494,8 @@ mod tests {
         let scene = scene(
             "<shape type='a'><integer name='i' value='-7'/><float name='x' value='2'/></shape>",
         );
-        let shape = scene.root().children(Kind::Shape)[0];
-        assert_eq!(shape.float("i").unwrap(), Some(-7.0));
+        let shape = shape(&scene);
+        assert_eq!(shape.float("i").unwrap(), -7.0);
         assert!(shape.integer("x").is_err());
     }
 
@@ -344,45 +504,56 @@ mod tests {
         let scene = scene(
             "<shape type='a'><transform name='to_world'><translate x='2'/></transform></shape>",
         );
-        let shape = scene.root().children(Kind::Shape)[0];
+        let shape = shape(&scene);
         let keyframes = shape.animation("to_world").unwrap().unwrap();
         assert_eq!(keyframes.len(), 1);
         assert_eq!(keyframes[0].1.w_axis.x, 2.0);
     }
 
     #[test]
-    fn what_nobody_read_is_reported_with_the_name_that_was_meant() {
-        let scene = scene(
-            "<bsdf type='unused' id='spare'><float name='x' value='1'/></bsdf>
-             <shape type='sphere'><float name='raduis' value='1'/><bsdf type='diffuse'/></shape>",
-        );
-        let sphere = scene.root().children(Kind::Shape)[0];
-        assert!(sphere.float("radius").unwrap().is_none());
-        let unread: Vec<_> = scene.unread().iter().map(ToString::to_string).collect();
-        assert_eq!(unread.len(), 2, "{unread:?}");
+    fn what_is_absent_is_what_the_table_declares() {
+        let scene = scene("\n<shape type='sphere'/>");
+        let sphere = shape(&scene);
+        assert_eq!(sphere.float("radius").unwrap(), 1.5);
+        assert_eq!(sphere.string("name").unwrap(), "nobody");
+        assert_eq!(sphere.choice("side").unwrap(), "Left");
+        let message = sphere.float("height").unwrap_err().to_string();
         assert!(
-            unread[0]
-                .ends_with("shape \"sphere\" has no property \"raduis\"; did you mean \"radius\"?")
+            message.starts_with("test.xml:2:1: shape \"sphere\" needs \"height\""),
+            "{message}"
         );
-        assert!(unread[1].contains("no use for the bsdf \"diffuse\""));
     }
 
     #[test]
-    fn nothing_is_unread_once_all_was_read_or_ignored() {
-        let scene =
-            scene("<shape type='a'><float name='x' value='1'/><float name='y' value='1'/></shape>");
-        let shape = scene.root().children(Kind::Shape)[0];
-        shape.float("x").unwrap();
-        assert_eq!(scene.unread().len(), 1);
-        shape.ignore("y");
-        assert!(scene.unread().is_empty());
+    fn what_is_out_of_range_or_no_choice_is_told_with_what_would_be_right() {
+        let scene = scene(
+            "\n<shape type='sphere'>\n<float name='radius' value='0'/>\n<string name='side' value='rihgt'/></shape>",
+        );
+        let sphere = shape(&scene);
+        assert_eq!(
+            sphere.float("radius").unwrap_err().to_string(),
+            "test.xml:3:1: radius must be above 0, and 0 is not"
+        );
+        let message = sphere.choice("side").unwrap_err().to_string();
+        assert!(
+            message.starts_with("test.xml:4:1: unknown side \"rihgt\""),
+            "{message}"
+        );
+        assert!(message.contains("did you mean \"right\""), "{message}");
+    }
+
+    #[test]
+    #[should_panic(expected = "does not declare")]
+    fn reading_what_is_not_declared_is_a_mistake_of_the_plugin() {
+        let scene = scene("<shape type='sphere'/>");
+        let _ = shape(&scene).float("undeclared");
     }
 
     #[test]
     fn a_missing_file_lists_the_places_where_it_was_looked_for() {
         let scene =
             scene("<shape type='obj'><string name='filename' value='no/such.obj'/></shape>");
-        let shape = scene.root().children(Kind::Shape)[0];
+        let shape = shape(&scene);
         let message = shape.file("filename").unwrap_err().to_string();
         assert!(
             message.contains("cannot find the file \"no/such.obj\""),

@@ -173,10 +173,10 @@ fn describe(node: &Node) -> String {
 
 /// The folders in which files are looked for: each scene file has its own and goes on with those of the file that
 /// includes it.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Scopes(Vec<Scope>);
 
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct Scope {
     /// The latest is looked into first.
     folders: Vec<PathBuf>,

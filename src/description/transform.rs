@@ -197,7 +197,7 @@ mod tests {
             "<scene version='3.0.0'><shape type='a'><transform name='t'>{operations}</transform></shape></scene>"
         );
         let scene = Description::parse(&text, Path::new("test.xml"), options)?;
-        let m = scene.root().children(Kind::Shape)[0].transform("t")?;
+        let m = scene.root().children(Kind::Shape)[0].given("t")?;
         Ok(m.expect("the shape has it"))
     }
 

@@ -2,6 +2,7 @@
 
 use super::Kernel;
 use crate::description::Properties;
+use crate::description::declared::Plugin;
 use crate::error::Result;
 
 /// Half a pixel to each side.
@@ -9,6 +10,11 @@ use crate::error::Result;
 pub struct Box;
 
 impl Box {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "weight 1 on the pixel alone",
+        properties: &[],
+    };
+
     pub(super) fn build(_properties: &Properties<'_>, _context: &()) -> Result<Self> {
         Ok(Self)
     }

@@ -2,6 +2,7 @@
 
 use super::Kernel;
 use crate::description::Properties;
+use crate::description::declared::Plugin;
 use crate::error::Result;
 
 /// A cubic of radius 2.
@@ -9,6 +10,11 @@ use crate::error::Result;
 pub struct CatmullRom;
 
 impl CatmullRom {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "Catmull and Rom's cubic: sharp, with negative lobes",
+        properties: &[],
+    };
+
     pub(super) fn build(_properties: &Properties<'_>, _context: &()) -> Result<Self> {
         Ok(Self)
     }

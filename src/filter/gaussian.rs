@@ -2,6 +2,7 @@
 
 use super::Kernel;
 use crate::description::Properties;
+use crate::description::declared::{Plugin, float};
 use crate::error::Result;
 use crate::math::exp::exp;
 
@@ -14,16 +15,14 @@ pub struct Gaussian {
 }
 
 impl Gaussian {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "a bell, cut off at four standard deviations",
+        properties: &[&[float("stddev", 0.5, "standard deviation in pixels")
+            .between(0.01, super::MAX_RADIUS / 4.0)]],
+    };
+
     pub(super) fn build(properties: &Properties<'_>, _context: &()) -> Result<Self> {
-        let stddev = properties.float("stddev")?.unwrap_or(0.5);
-        if !(0.01..=super::MAX_RADIUS / 4.0).contains(&stddev) {
-            let message = format!(
-                "a standard deviation of {stddev} pixels is not between 0.01 and {}",
-                super::MAX_RADIUS / 4.0
-            );
-            return Err(properties.error("stddev", message));
-        }
-        Ok(Self::new(stddev as f32))
+        Ok(Self::new(properties.float("stddev")? as f32))
     }
 
     fn new(stddev: f32) -> Self {

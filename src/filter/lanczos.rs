@@ -2,6 +2,7 @@
 
 use super::Kernel;
 use crate::description::Properties;
+use crate::description::declared::{Plugin, integer};
 use crate::error::Result;
 
 /// A windowed sinc.
@@ -11,16 +12,17 @@ pub struct Lanczos {
 }
 
 impl Lanczos {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "a windowed sinc: the sharpest, with ringing",
+        properties: &[&[
+            integer("lobes", 3, "lobes of the sinc; the radius in pixels")
+                .between(1.0, super::MAX_RADIUS),
+        ]],
+    };
+
     pub(super) fn build(properties: &Properties<'_>, _context: &()) -> Result<Self> {
-        let lobes = properties.integer("lobes")?.unwrap_or(3);
-        if !(1..=super::MAX_RADIUS as i64).contains(&lobes) {
-            return Err(properties.error(
-                "lobes",
-                format!("{lobes} lobes; 1 to {} are possible", super::MAX_RADIUS),
-            ));
-        }
         Ok(Self {
-            lobes: lobes as f32,
+            lobes: properties.integer("lobes")? as f32,
         })
     }
 }

@@ -2,6 +2,7 @@
 
 use super::Kernel;
 use crate::description::Properties;
+use crate::description::declared::{Plugin, float};
 use crate::error::Result;
 
 /// A cubic of radius 2.
@@ -12,11 +13,18 @@ pub struct Mitchell {
 }
 
 impl Mitchell {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "Mitchell and Netravali's cubics",
+        properties: &[&[
+            float("B", 1.0 / 3.0, "blur"),
+            float("C", 1.0 / 3.0, "ringing"),
+        ]],
+    };
+
     pub(super) fn build(properties: &Properties<'_>, _context: &()) -> Result<Self> {
-        let parameter = |name| Ok(properties.float(name)?.unwrap_or(1.0 / 3.0) as f32);
         Ok(Self {
-            b: parameter("B")?,
-            c: parameter("C")?,
+            b: properties.float("B")? as f32,
+            c: properties.float("C")? as f32,
         })
     }
 }

@@ -8,8 +8,6 @@ mod lanczos;
 mod mitchell;
 mod tent;
 
-use crate::description::Properties;
-use crate::error::Result;
 use crate::family::family;
 
 /// What every filter does.
@@ -29,7 +27,7 @@ pub trait Kernel: std::fmt::Debug + Send + Sync {
 family! {
     /// Every reconstruction filter there is.
     #[derive(Clone, Debug)]
-    pub enum Filter: Kernel, kind "rfilter", context () {
+    pub enum Filter: Kernel, context () {
         "box" => Box(r#box::Box),
         "catmullrom" => CatmullRom(catmullrom::CatmullRom),
         "gaussian" => Gaussian(gaussian::Gaussian),
@@ -55,16 +53,6 @@ impl Filter {
 
 /// The widest radius in pixels, so that a tile's border stays small.
 pub(crate) const MAX_RADIUS: f64 = 16.0;
-
-/// The property `radius`, in pixels.
-fn radius(properties: &Properties<'_>, default: f64) -> Result<f32> {
-    let radius = properties.float("radius")?.unwrap_or(default);
-    if !(0.1..=MAX_RADIUS).contains(&radius) {
-        let message = format!("a radius of {radius} pixels is not between 0.1 and {MAX_RADIUS}");
-        return Err(properties.error("radius", message));
-    }
-    Ok(radius as f32)
-}
 
 /// The two-parameter family of cubics of Mitchell and Netravali, *Reconstruction filters in computer
 /// graphics* (1988), radius 2.
@@ -92,7 +80,7 @@ mod tests {
 
     #[test]
     fn every_filter_is_even_ends_at_its_radius_and_has_a_positive_integral() {
-        for name in Filter::NAMES {
+        for (name, _) in Filter::PLUGINS {
             let text = format!(r#"<scene version="3.0.0"><rfilter type="{name}"/></scene>"#);
             let scene =
                 Description::parse(&text, Path::new("test.xml"), &Options::default()).unwrap();

@@ -2,6 +2,7 @@
 
 use super::Kernel;
 use crate::description::Properties;
+use crate::description::declared::{Plugin, float};
 use crate::error::Result;
 
 /// A triangle.
@@ -11,9 +12,15 @@ pub struct Tent {
 }
 
 impl Tent {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "weight that falls linearly to 0",
+        properties: &[&[float("radius", 1.0, "where the weight is 0, in pixels")
+            .between(0.1, super::MAX_RADIUS)]],
+    };
+
     pub(super) fn build(properties: &Properties<'_>, _context: &()) -> Result<Self> {
         Ok(Self {
-            radius: super::radius(properties, 1.0)?,
+            radius: properties.float("radius")? as f32,
         })
     }
 }

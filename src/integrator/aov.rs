@@ -8,6 +8,7 @@ use std::collections::HashSet;
 use super::limits;
 use super::{Context, Cost, Estimate, Estimates, Estimator, Footprint, Integrator, Start};
 use crate::color::{ColorModel, Spectral};
+use crate::description::declared::{Plugin, nested, string};
 use crate::description::{Kind, Properties, Property, Value};
 use crate::error::Result;
 use crate::interaction::{Interaction, Ray};
@@ -65,15 +66,20 @@ pub struct Aov<C: ColorModel> {
 }
 
 impl<C: ColorModel> Aov<C> {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "other quantities beside the image",
+        properties: &[
+            limits::UNUSED,
+            &[
+                string("aovs", "", "name:kind pairs, parted by commas"),
+                nested(Kind::Integrator, "whose image is written too"),
+            ],
+        ],
+    };
+
     pub(super) fn build(properties: &Properties<'_>, context: &Context) -> Result<Self> {
-        limits::hides_emitters(properties)?;
         let mut quantities = Vec::new();
-        for item in properties
-            .string("aovs")?
-            .unwrap_or_default()
-            .split(',')
-            .map(str::trim)
-        {
+        for item in properties.string("aovs")?.split(',').map(str::trim) {
             if item.is_empty() {
                 continue;
             }

@@ -4,6 +4,7 @@ use super::limits;
 use super::{Context, Cost, Estimate, Estimates, Estimator, Start};
 use crate::color::{ColorModel, Spectral};
 use crate::description::Properties;
+use crate::description::declared::Plugin;
 use crate::error::Result;
 use crate::interaction::Ray;
 use crate::sampler::Sampler;
@@ -14,8 +15,12 @@ use crate::scene::Scene;
 pub struct Depth;
 
 impl Depth {
-    pub(super) fn build(properties: &Properties<'_>, _context: &Context) -> Result<Self> {
-        limits::hides_emitters(properties)?;
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "the distance to what the camera sees",
+        properties: &[limits::UNUSED],
+    };
+
+    pub(super) fn build(_properties: &Properties<'_>, _context: &Context) -> Result<Self> {
         Ok(Self)
     }
 }

@@ -10,6 +10,7 @@ use super::mis::power;
 use super::{Context, Cost, Estimate, Estimates, Estimator, Start};
 use crate::color::{ColorModel, Spectral};
 use crate::description::Properties;
+use crate::description::declared::{Plugin, integer};
 use crate::error::Result;
 use crate::interaction::Ray;
 use crate::sampler::Sampler;
@@ -35,21 +36,33 @@ struct Probe<S> {
 }
 
 /// The most samples of a kind.
-const MAX_SAMPLES: i64 = 1 << 12;
+const MAX_SAMPLES: f64 = 4096.0;
 
 impl Direct {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "direct light",
+        properties: &[
+            limits::COMMON,
+            &[
+                integer(
+                    "shading_samples",
+                    1,
+                    "samples of either kind; not beside the other two",
+                )
+                .between(0.0, MAX_SAMPLES),
+                integer("emitter_samples", 1, "samples of lights")
+                    .between(0.0, MAX_SAMPLES)
+                    .absent("shading_samples"),
+                integer("bsdf_samples", 1, "samples of materials")
+                    .between(0.0, MAX_SAMPLES)
+                    .absent("shading_samples"),
+            ],
+        ],
+    };
+
     pub(super) fn build(properties: &Properties<'_>, _context: &Context) -> Result<Self> {
-        let count = |name: &'static str, default: u32| {
-            let n = properties.integer(name)?.unwrap_or(i64::from(default));
-            if !(0..=MAX_SAMPLES).contains(&n) {
-                return Err(properties.error(
-                    name,
-                    format!("{n} samples; 0 to {MAX_SAMPLES} are possible"),
-                ));
-            }
-            Ok(n as u32)
-        };
-        let shading = count("shading_samples", 1)?;
+        let shading = properties.integer("shading_samples")?;
+        let count = |name| -> Result<u32> { Ok(properties.given(name)?.unwrap_or(shading) as u32) };
         if properties.has("shading_samples") {
             for name in ["emitter_samples", "bsdf_samples"] {
                 if properties.has(name) {
@@ -60,17 +73,14 @@ impl Direct {
                 }
             }
         }
-        let (emitter_samples, bsdf_samples) = (
-            count("emitter_samples", shading)?,
-            count("bsdf_samples", shading)?,
-        );
+        let (emitter_samples, bsdf_samples) = (count("emitter_samples")?, count("bsdf_samples")?);
         if emitter_samples + bsdf_samples == 0 {
             return Err(properties.error(
                 "bsdf_samples",
                 "direct needs at least one sample of either kind",
             ));
         }
-        let hide_emitters = limits::hides_emitters(properties)?;
+        let hide_emitters = properties.boolean("hide_emitters")?;
         Ok(Self {
             emitter_samples,
             bsdf_samples,

@@ -54,7 +54,7 @@ impl Layers {
     /// The property `layers`, for a scene with lights of these names.
     pub(super) fn build(properties: &Properties<'_>, lights: &[String]) -> Result<Self> {
         let mut layers = Self::default();
-        let listed = properties.string("layers")?.unwrap_or_default();
+        let listed = properties.string("layers")?;
         for name in listed.split(',').map(str::trim).filter(|n| !n.is_empty()) {
             match name {
                 "terms" => layers.terms = true,

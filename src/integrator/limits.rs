@@ -9,21 +9,48 @@
 
 use crate::color::Spectral;
 use crate::description::Properties;
+use crate::description::declared::{Row, boolean, float, integer};
 use crate::error::{Problem, Result};
 
-/// Reads what every integrator has; whether it hides emitters.
-pub(super) fn hides_emitters(properties: &Properties<'_>) -> Result<bool> {
-    properties.integer("block_size")?;
-    properties.integer("samples_per_pass")?;
-    properties.float("timeout")?;
-    Ok(properties.boolean("hide_emitters")?.unwrap_or(false))
-}
+const HIDE_EMITTERS: Row = boolean(
+    "hide_emitters",
+    false,
+    "whether the camera looks through lights",
+);
+const BLOCK_SIZE: Row = integer("block_size", 0, "how Mitsuba cuts the film").without_effect();
+const SAMPLES_PER_PASS: Row =
+    integer("samples_per_pass", 0, "how Mitsuba parts samples").without_effect();
+const TIMEOUT: Row =
+    float("timeout", -1.0, "seconds; --time-limit takes its place").without_effect();
+const MAX_DEPTH: Row = integer(
+    "max_depth",
+    -1,
+    "most edges of a path: 1 is emission alone, 2 direct light; −1 no limit",
+)
+.at_least(-1.0);
+const RR_DEPTH: Row =
+    integer("rr_depth", 5, "from which depth on roulette ends paths").at_least(1.0);
+
+/// What every integrator that asks for light reads.
+pub(super) const COMMON: &[Row] = &[HIDE_EMITTERS, BLOCK_SIZE, SAMPLES_PER_PASS, TIMEOUT];
+
+/// How long paths may become.
+pub(super) const LIMITS: &[Row] = &[MAX_DEPTH, RR_DEPTH];
+
+/// What integrators accept that do not ask for light themselves.
+pub(super) const UNUSED: &[Row] = &[
+    HIDE_EMITTERS.without_effect(),
+    MAX_DEPTH.without_effect(),
+    RR_DEPTH.without_effect(),
+    BLOCK_SIZE,
+    SAMPLES_PER_PASS,
+    TIMEOUT,
+];
 
 /// The note that `timeout` does not end the render, where the integrator has one.
 pub fn timeout_note(properties: &Properties<'_>) -> Result<Option<Problem>> {
-    let seconds = properties
-        .float("timeout")?
-        .filter(|seconds| *seconds > 0.0);
+    let given: Option<f64> = properties.given("timeout")?;
+    let seconds = given.filter(|seconds| *seconds > 0.0);
     Ok(seconds.map(|seconds| {
         let error = properties.error("timeout", "timeout does not end a render here");
         let error = error.help(format!("--time-limit {seconds}s does"));
@@ -53,19 +80,12 @@ const MAX_SURVIVAL: f32 = 0.95;
 
 impl Limits {
     pub(super) fn build(properties: &Properties<'_>) -> Result<Self> {
-        let depth = |name: &'static str, default: i64, least: i64| {
-            let depth = properties.integer(name)?.unwrap_or(default);
-            if depth < least {
-                return Err(properties.error(
-                    name,
-                    format!("{name} must be at least {least}, and {depth} is not"),
-                ));
-            }
-            Ok(u32::try_from(depth).unwrap_or(u32::MAX))
+        let depth = |name| -> Result<u32> {
+            Ok(u32::try_from(properties.integer(name)?).unwrap_or(u32::MAX))
         };
         Ok(Self {
-            max_depth: depth("max_depth", -1, -1)?,
-            rr_depth: depth("rr_depth", 5, 1)?,
+            max_depth: depth("max_depth")?,
+            rr_depth: depth("rr_depth")?,
         })
     }
 
@@ -114,12 +134,11 @@ mod tests {
         let inside =
             "<boolean name='hide_emitters' value='true'/><float name='timeout' value='30'/>
             <integer name='block_size' value='16'/><integer name='samples_per_pass' value='4'/>";
-        for name in Integrator::<Rgb>::NAMES {
+        for (name, _) in Integrator::<Rgb>::PLUGINS {
             let scene = integrator(name, inside);
             let properties = &scene.root().children(Kind::Integrator)[0];
             Integrator::<Rgb>::build(properties, &Context::default())
                 .unwrap_or_else(|e| panic!("{name}: {e}"));
-            assert_eq!(scene.unread(), [], "{name}");
             let note = timeout_note(properties).unwrap().unwrap();
             assert!(note.to_string().contains("timeout does not end"), "{note}");
         }

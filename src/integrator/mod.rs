@@ -90,7 +90,7 @@ pub struct Context {
 family! {
     /// Every integrator there is.
     #[derive(Debug)]
-    pub enum Integrator<C>: Estimator, kind "integrator", context Context {
+    pub enum Integrator<C>: Estimator, context Context {
         "aov" => Aov(aov::Aov<C>),
         "depth" => Depth(depth::Depth),
         "direct" => Direct(direct::Direct),

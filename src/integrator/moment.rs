@@ -4,6 +4,7 @@
 use super::limits;
 use super::{Context, Cost, Estimates, Estimator, Integrator, Start};
 use crate::color::ColorModel;
+use crate::description::declared::{Plugin, nested};
 use crate::description::{Kind, Properties};
 use crate::error::Result;
 use crate::sampler::Sampler;
@@ -16,8 +17,15 @@ pub struct Moment<C: ColorModel> {
 }
 
 impl<C: ColorModel> Moment<C> {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "the image of its nested integrator",
+        properties: &[
+            limits::UNUSED,
+            &[nested(Kind::Integrator, "what is rendered")],
+        ],
+    };
+
     pub(super) fn build(properties: &Properties<'_>, context: &Context) -> Result<Self> {
-        limits::hides_emitters(properties)?;
         match &properties.children(Kind::Integrator)[..] {
             [child] => Ok(Self {
                 nested: Box::new(Integrator::<C>::build(child, context)?),

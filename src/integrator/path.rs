@@ -10,6 +10,7 @@ use super::mis::power;
 use super::{Context, Cost, Estimate, Estimates, Estimator, Start};
 use crate::color::{ColorModel, Spectral};
 use crate::description::Properties;
+use crate::description::declared::Plugin;
 use crate::error::Result;
 use crate::interaction::{Interaction, Ray};
 use crate::light::LightSample;
@@ -50,10 +51,15 @@ struct Shadow<S> {
 }
 
 impl Path {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "paths: emission, light samples and material samples",
+        properties: &[limits::COMMON, limits::LIMITS],
+    };
+
     pub(super) fn build(properties: &Properties<'_>, _context: &Context) -> Result<Self> {
         Ok(Self {
             limits: Limits::build(properties)?,
-            hide_emitters: limits::hides_emitters(properties)?,
+            hide_emitters: properties.boolean("hide_emitters")?,
         })
     }
 

@@ -18,6 +18,7 @@ use super::limits::{self, Limits};
 use super::{Context, Cost, Estimate, Estimates, Estimator, Start};
 use crate::color::{ColorModel, Spectral};
 use crate::description::Properties;
+use crate::description::declared::{Plugin, boolean, choice, string};
 use crate::error::Result;
 use crate::interaction::{Interaction, Ray};
 use crate::light::LightSample;
@@ -41,7 +42,7 @@ enum Falloff {
     InverseSquare,
 }
 
-const FALLOFFS: [&str; 2] = ["none", "inverse_square"];
+const FALLOFFS: &[&str] = &["none", "inverse_square"];
 
 /// Shadow rays that are asked about at once: a scene may have any number of lights.
 const SHADOWS: usize = 1 << 14;
@@ -122,22 +123,37 @@ impl<S: Spectral> Batch<'_, S> {
 }
 
 impl Phong {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "Phong's equation as textbooks have it, unnormalised",
+        properties: &[
+            limits::COMMON,
+            limits::LIMITS,
+            &[
+                choice("falloff", FALLOFFS, "how light weakens with distance"),
+                boolean(
+                    "shadows",
+                    true,
+                    "whether lights are hidden by what stands before them",
+                ),
+                string(
+                    "layers",
+                    "",
+                    "terms, lights or both, parted by commas: EXR layers",
+                ),
+            ],
+        ],
+    };
+
     pub(super) fn build(properties: &Properties<'_>, context: &Context) -> Result<Self> {
-        let falloff = match properties.string("falloff")?.unwrap_or(FALLOFFS[0]) {
-            "none" => Falloff::None,
+        let falloff = match properties.choice("falloff")? {
             "inverse_square" => Falloff::InverseSquare,
-            other => {
-                let error = properties.error("falloff", format!("unknown falloff {other:?}"));
-                return Err(error
-                    .suggest(other, FALLOFFS)
-                    .help("there are \"none\" and \"inverse_square\""));
-            }
+            _ => Falloff::None,
         };
         Ok(Self {
             limits: Limits::build(properties)?,
-            hide_emitters: limits::hides_emitters(properties)?,
+            hide_emitters: properties.boolean("hide_emitters")?,
             falloff,
-            shadows: properties.boolean("shadows")?.unwrap_or(true),
+            shadows: properties.boolean("shadows")?,
             layers: Layers::build(properties, &context.lights)?,
         })
     }

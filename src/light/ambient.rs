@@ -5,8 +5,9 @@
 use glam::{Vec2, Vec3};
 
 use super::{Emitter, LightContext, LightSample};
-use crate::color::{Color, ColorModel, Role};
+use crate::color::{ColorModel, Role};
 use crate::description::Properties;
+use crate::description::declared::{Plugin, color};
 use crate::error::Result;
 
 /// Light from nowhere.
@@ -16,14 +17,18 @@ pub struct Ambient<C: ColorModel> {
 }
 
 impl<C: ColorModel> Ambient<C> {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "light from nowhere that meets ambient_reflectance alone",
+        properties: &[&[color("radiance", 1.0, "everywhere; W/(m² sr)")]],
+    };
+
     pub(super) fn build(
         properties: &Properties<'_>,
         context: &LightContext<'_, C>,
     ) -> Result<Self> {
         let colors = &context.palettes.colors;
-        let default = Color::Grey(1.0);
         Ok(Self {
-            radiance: colors.color(properties, "radiance", Role::Emission, default)?,
+            radiance: colors.color(properties, "radiance", Role::Emission)?,
         })
     }
 }

@@ -8,8 +8,9 @@ use glam::{Vec2, Vec3};
 
 use super::brightness::Brightness;
 use super::{Emitter, LightContext, LightSample, interaction, mean_of};
-use crate::color::{Color, ColorModel, Role, Spectral};
+use crate::color::{ColorModel, Role, Spectral};
 use crate::description::Properties;
+use crate::description::declared::{Plugin, texture};
 use crate::error::Result;
 use crate::interaction::Interaction;
 use crate::shape::Geometry;
@@ -27,6 +28,14 @@ pub struct Area<C: ColorModel> {
 }
 
 impl<C: ColorModel> Area<C> {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "light from the front of the shape that it stands in",
+        properties: &[
+            &[texture("radiance", 1.0, "in every direction; W/(m² sr)")],
+            super::SAMPLING,
+        ],
+    };
+
     pub(super) fn build(
         properties: &Properties<'_>,
         context: &LightContext<'_, C>,
@@ -40,7 +49,7 @@ impl<C: ColorModel> Area<C> {
                 .help("nest it in a <shape>"));
         };
         let Palettes { colors, .. } = context.palettes;
-        let radiance = colors.texture(properties, "radiance", Role::Emission, Color::Grey(1.0))?;
+        let radiance = colors.texture(properties, "radiance", Role::Emission)?;
         let (mean, brightness) = match &radiance {
             Texture::Uniform(value) => (mean_of(&colors.color, value.value()), None),
             _ => Brightness::survey(&radiance, shape, &colors.color),

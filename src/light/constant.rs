@@ -5,8 +5,9 @@ use std::f32::consts::FRAC_1_PI;
 use glam::{Vec2, Vec3};
 
 use super::{Emitter, LightContext, LightSample, mean_of};
-use crate::color::{Color, ColorModel, Role};
+use crate::color::{ColorModel, Role};
 use crate::description::Properties;
+use crate::description::declared::{Plugin, color};
 use crate::error::Result;
 use crate::math::warp;
 
@@ -19,16 +20,25 @@ pub struct Constant<C: ColorModel> {
 const PDF: f32 = 0.25 * FRAC_1_PI;
 
 impl<C: ColorModel> Constant<C> {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "the same light from everywhere around",
+        properties: &[
+            &[
+                color("radiance", 1.0, "from every direction; W/(m² sr)"),
+                super::TO_WORLD.without_effect(),
+            ],
+            super::SAMPLING,
+        ],
+    };
+
     pub(super) fn build(
         properties: &Properties<'_>,
         context: &LightContext<'_, C>,
     ) -> Result<Self> {
-        let radiance = context.palettes.colors.color(
-            properties,
-            "radiance",
-            Role::Emission,
-            Color::Grey(1.0),
-        )?;
+        let radiance = context
+            .palettes
+            .colors
+            .color(properties, "radiance", Role::Emission)?;
         Ok(Self { radiance })
     }
 }

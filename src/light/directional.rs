@@ -6,8 +6,9 @@ use std::f64::consts::PI;
 use glam::{DVec3, Vec2, Vec3};
 
 use super::{Emitter, LightContext, LightSample, mean_of, to_world};
-use crate::color::{Color, ColorModel, Role};
+use crate::color::{ColorModel, Role};
 use crate::description::Properties;
+use crate::description::declared::{Plugin, color, vector};
 use crate::error::Result;
 
 /// How far a scale may be from 1 without a word.
@@ -22,11 +23,24 @@ pub struct Directional<C: ColorModel> {
 }
 
 impl<C: ColorModel> Directional<C> {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "parallel light",
+        properties: &[
+            &[
+                color("irradiance", 1.0, "of a surface at right angles; W/m²"),
+                vector("direction", [0.0, 0.0, 1.0], "where the light goes")
+                    .absent("+z of to_world"),
+                super::TO_WORLD,
+            ],
+            super::SAMPLING,
+        ],
+    };
+
     pub(super) fn build(
         properties: &Properties<'_>,
         context: &LightContext<'_, C>,
     ) -> Result<Self> {
-        let direction = match properties.vector("direction")? {
+        let direction = match properties.given::<DVec3>("direction")? {
             Some(_) if properties.has("to_world") => {
                 return Err(
                     properties.error("direction", "direction and to_world exclude each other")
@@ -50,12 +64,10 @@ impl<C: ColorModel> Directional<C> {
         if direction == DVec3::ZERO {
             return Err(properties.error("direction", "a direction cannot have length 0"));
         }
-        let irradiance = context.palettes.colors.color(
-            properties,
-            "irradiance",
-            Role::Emission,
-            Color::Grey(1.0),
-        )?;
+        let irradiance = context
+            .palettes
+            .colors
+            .color(properties, "irradiance", Role::Emission)?;
         Ok(Self {
             irradiance,
             direction: direction.as_vec3(),

@@ -12,6 +12,7 @@ use glam::{Mat3, Vec2, Vec3};
 use super::{Emitter, LightContext, LightSample, rotation};
 use crate::color::{ColorModel, Role, luminance};
 use crate::description::Properties;
+use crate::description::declared::{Plugin, boolean, file, float};
 use crate::error::Result;
 use crate::math::distribution::Grid;
 use crate::texture::Picture;
@@ -37,20 +38,30 @@ type Point = Vec2;
 const LEAST_SINE: f32 = 1e-7;
 
 impl<C: ColorModel> Envmap<C> {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "an image all around, by longitude and latitude",
+        properties: &[
+            &[
+                file("filename", "the image"),
+                float("scale", 1.0, "what radiance is multiplied by").at_least(0.0),
+                boolean(
+                    "mis_compensation",
+                    false,
+                    "which directions are drawn is free",
+                )
+                .without_effect(),
+                super::TO_WORLD,
+            ],
+            super::SAMPLING,
+        ],
+    };
+
     pub(super) fn build(
         properties: &Properties<'_>,
         context: &LightContext<'_, C>,
     ) -> Result<Self> {
-        let Some(path) = properties.file("filename")? else {
-            return Err(properties.error("filename", "an envmap needs a filename"));
-        };
-        let scale = properties.float("scale")?.unwrap_or(1.0);
-        if scale < 0.0 {
-            let message = format!("emission cannot be negative, and the scale {scale} is");
-            return Err(properties.error("scale", message));
-        }
-        // Which directions are drawn is free.
-        properties.boolean("mis_compensation")?;
+        let path = properties.file("filename")?;
+        let scale = properties.float("scale")?;
         let to_world = rotation(properties)?;
         let picture = Picture::read(&path, false).map_err(|e| e.at(properties.location()))?;
         let [width, height] = picture.size();

@@ -12,10 +12,11 @@ mod spot;
 
 use std::sync::Arc;
 
-use glam::{DMat4, Mat3, Vec2, Vec3};
+use glam::{Mat3, Vec2, Vec3};
 
 use crate::color::{ColorModel, Spectral};
 use crate::description::Properties;
+use crate::description::declared::{Row, float, transform};
 use crate::error::Result;
 use crate::family::family;
 use crate::interaction::Interaction;
@@ -98,7 +99,7 @@ pub struct LightContext<'a, C: ColorModel> {
 family! {
     /// Every light there is.
     #[derive(Clone, Debug)]
-    pub enum Light<C>: Emitter, kind "emitter", context LightContext<'_, C> {
+    pub enum Light<C>: Emitter, context LightContext<'_, C> {
         "ambient" => Ambient(ambient::Ambient<C>),
         "area" => Area(area::Area<C>),
         "constant" => Constant(constant::Constant<C>),
@@ -110,9 +111,21 @@ family! {
     }
 }
 
+/// What every light that can be drawn reads.
+const SAMPLING: &[Row] = &[SAMPLING_WEIGHT];
+/// How often a light is chosen beside others; the scene reads it.
+pub const SAMPLING_WEIGHT: Row = float(
+    "sampling_weight",
+    1.0,
+    "how often the light is chosen for light sampling, beside others; 0 is never",
+)
+.at_least(0.0);
+/// Where a light stands.
+const TO_WORLD: Row = transform("to_world", "from the light's space to the world");
+
 /// The property `to_world`.
 fn to_world(properties: &Properties<'_>) -> Result<Transform> {
-    let matrix = properties.transform("to_world")?.unwrap_or(DMat4::IDENTITY);
+    let matrix = properties.transform("to_world")?;
     Transform::new(&matrix)
         .ok_or_else(|| properties.error("to_world", "the transform must be affine and invertible"))
 }

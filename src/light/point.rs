@@ -2,11 +2,12 @@
 
 use std::f64::consts::PI;
 
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 
 use super::{Emitter, LightContext, LightSample, mean_of, origin};
-use crate::color::{Color, ColorModel, Role};
+use crate::color::{ColorModel, Role};
 use crate::description::Properties;
+use crate::description::declared::{Plugin, color, vector};
 use crate::error::Result;
 
 /// A point that gives light.
@@ -17,11 +18,23 @@ pub struct Point<C: ColorModel> {
 }
 
 impl<C: ColorModel> Point<C> {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "light from a point",
+        properties: &[
+            &[
+                color("intensity", 1.0, "in every direction; W/sr"),
+                vector("position", [0.0; 3], "where the light is").absent("origin of to_world"),
+                super::TO_WORLD,
+            ],
+            super::SAMPLING,
+        ],
+    };
+
     pub(super) fn build(
         properties: &Properties<'_>,
         context: &LightContext<'_, C>,
     ) -> Result<Self> {
-        let position = match properties.vector("position")? {
+        let position = match properties.given::<DVec3>("position")? {
             Some(_) if properties.has("to_world") => {
                 return Err(
                     properties.error("position", "position and to_world exclude each other")
@@ -30,12 +43,10 @@ impl<C: ColorModel> Point<C> {
             Some(position) => position.as_vec3(),
             None => origin(properties)?,
         };
-        let intensity = context.palettes.colors.color(
-            properties,
-            "intensity",
-            Role::Emission,
-            Color::Grey(1.0),
-        )?;
+        let intensity = context
+            .palettes
+            .colors
+            .color(properties, "intensity", Role::Emission)?;
         Ok(Self {
             intensity,
             position,

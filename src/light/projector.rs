@@ -7,8 +7,9 @@ use std::f64::consts::PI;
 use glam::{Vec2, Vec3};
 
 use super::{Emitter, LightContext, LightSample, mean_over_square, texture_point, to_world};
-use crate::color::{Color, ColorModel, Role};
+use crate::color::{ColorModel, Role};
 use crate::description::Properties;
+use crate::description::declared::{Plugin, float, texture};
 use crate::error::Result;
 use crate::math::Transform;
 use crate::sensor::tangent_x;
@@ -25,21 +26,31 @@ pub struct Projector<C: ColorModel> {
 }
 
 impl<C: ColorModel> Projector<C> {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "an image thrown from a point",
+        properties: &[
+            &[
+                texture("irradiance", 1.0, "the image; W/m² at distance 1").required(),
+                float("scale", 1.0, "what the image is multiplied by"),
+                super::TO_WORLD,
+            ],
+            crate::sensor::FIELD_OF_VIEW,
+            super::SAMPLING,
+        ],
+    };
+
     pub(super) fn build(
         properties: &Properties<'_>,
         context: &LightContext<'_, C>,
     ) -> Result<Self> {
-        if !properties.has("irradiance") {
-            return Err(properties.error("irradiance", "a projector needs an irradiance"));
-        }
         let colors = &context.palettes.colors;
-        let image = colors.texture(properties, "irradiance", Role::Emission, Color::Grey(1.0))?;
+        let image = colors.texture(properties, "irradiance", Role::Emission)?;
         let [width, height] = image.resolution();
         let aspect = width as f64 / height as f64;
         let tangent = tangent_x(properties, aspect)?;
         Ok(Self {
             image,
-            scale: properties.float("scale")?.unwrap_or(1.0) as f32,
+            scale: properties.float("scale")? as f32,
             to_world: to_world(properties)?,
             half: Vec2::new(tangent as f32, (tangent / aspect) as f32),
         })

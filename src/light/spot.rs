@@ -9,7 +9,8 @@ use glam::{Vec2, Vec3};
 use super::{
     Emitter, LightContext, LightSample, mean_of, mean_over_square, texture_point, to_world,
 };
-use crate::color::{Color, ColorModel, Role};
+use crate::color::{ColorModel, Role};
+use crate::description::declared::{Plugin, color, float, map};
 use crate::description::{Kind, Properties};
 use crate::error::Result;
 use crate::math::Transform;
@@ -28,33 +29,49 @@ pub struct Spot<C: ColorModel> {
 }
 
 impl<C: ColorModel> Spot<C> {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "light from a point into a cone",
+        properties: &[
+            &[
+                color("intensity", 1.0, "along the axis; W/sr"),
+                float(
+                    "cutoff_angle",
+                    20.0,
+                    "from the axis to the dark, in degrees; with a texture at most 89",
+                )
+                .above_to(180.0),
+                float(
+                    "beam_width",
+                    15.0,
+                    "half the angle of full intensity, in degrees",
+                )
+                .absent("¾ of cutoff_angle")
+                .at_least(0.0),
+                map("texture", "what the intensity is multiplied by").absent("none"),
+                super::TO_WORLD,
+            ],
+            super::SAMPLING,
+        ],
+    };
+
     pub(super) fn build(
         properties: &Properties<'_>,
         context: &LightContext<'_, C>,
     ) -> Result<Self> {
-        let cutoff = properties.float("cutoff_angle")?.unwrap_or(20.0);
-        let widest = if properties.has("texture") {
-            89.0
-        } else {
-            180.0
-        };
-        if !(cutoff > 0.0 && cutoff <= widest) {
-            let message = format!("a cutoff angle of {cutoff}° is not between 0° and {widest}°");
+        let cutoff = properties.float("cutoff_angle")?;
+        if properties.has("texture") && cutoff > 89.0 {
+            let message =
+                format!("with a texture the cutoff angle is at most 89°, and not {cutoff}°");
             return Err(properties.error("cutoff_angle", message));
         }
         let colors = &context.palettes.colors;
-        let beam = properties.float("beam_width")?.unwrap_or(0.75 * cutoff);
-        if beam < 0.0 {
-            let message = format!("a beam width cannot be negative, and {beam}° is");
-            return Err(properties.error("beam_width", message));
-        }
+        let beam = properties.given("beam_width")?.unwrap_or(0.75 * cutoff);
         if beam > cutoff {
             let message = format!(
                 "the beam width of {beam}° is above the cutoff angle of {cutoff}°, where the light ends"
             );
             colors.warn(properties.error("beam_width", message));
         }
-        let light = (Role::Emission, Color::Grey(1.0));
         let slide = match properties.object("texture")? {
             Some(child) if child.kind() == Kind::Texture => Some(Texture::build(
                 &child,
@@ -64,7 +81,7 @@ impl<C: ColorModel> Spot<C> {
             None => None,
         };
         Ok(Self {
-            intensity: colors.color(properties, "intensity", light.0, light.1)?,
+            intensity: colors.color(properties, "intensity", Role::Emission)?,
             slide,
             to_world: to_world(properties)?,
             cutoff: cutoff.to_radians() as f32,

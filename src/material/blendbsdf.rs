@@ -6,7 +6,8 @@ use glam::{Vec2, Vec3};
 
 use super::{Bsdf, BsdfSample, BsdfValue, Lobes, Material, PhongTerms, fraction, nested};
 use crate::color::{ColorModel, Mono};
-use crate::description::Properties;
+use crate::description::declared::{Plugin, nested as nested_row, number};
+use crate::description::{Kind, Properties};
 use crate::error::Result;
 use crate::interaction::Interaction;
 use crate::texture::{Palettes, Texture};
@@ -19,14 +20,19 @@ pub struct BlendBsdf<C: ColorModel> {
 }
 
 impl<C: ColorModel> BlendBsdf<C> {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "two materials, mixed",
+        properties: &[&[
+            number("weight", 0.5, "the share of the second, clamped to [0, 1]").required(),
+            nested_row(Kind::Bsdf, "the two"),
+        ]],
+    };
+
     pub(super) fn build(properties: &Properties<'_>, palettes: &Palettes<C>) -> Result<Self> {
         let mut nested = nested(properties, palettes, 2..=2)?;
-        if properties.value("weight").is_none() {
-            return Err(properties.error("weight", "blendbsdf needs a weight, in [0, 1]"));
-        }
         let second = Box::new(nested.remove(1));
         Ok(Self {
-            weight: palettes.numbers.number(properties, "weight", 0.5)?,
+            weight: palettes.numbers.number(properties, "weight")?,
             nested: [Box::new(nested.remove(0)), second],
         })
     }

@@ -5,6 +5,7 @@ use glam::Vec3;
 
 use super::perturbed::{Normals, Perturbed};
 use crate::color::{ColorModel, Mono, Role};
+use crate::description::declared::{Plugin, float, nested};
 use crate::description::{Kind, Properties};
 use crate::error::Result;
 use crate::interaction::Interaction;
@@ -21,6 +22,17 @@ pub struct Bumps {
 }
 
 impl<C: ColorModel> BumpMap<C> {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "bumps from a texture of heights",
+        properties: &[
+            super::perturbed::PROPERTIES,
+            &[
+                nested(Kind::Texture, "heights, in scene units"),
+                float("scale", 1.0, "what heights are multiplied by"),
+            ],
+        ],
+    };
+
     pub(super) fn build(properties: &Properties<'_>, palettes: &Palettes<C>) -> Result<Self> {
         let textures = properties.children(Kind::Texture);
         let [texture] = &textures[..] else {
@@ -32,7 +44,7 @@ impl<C: ColorModel> BumpMap<C> {
         };
         let bumps = Bumps {
             height: Texture::build(texture, &palettes.numbers.with_role(Role::Quantity))?,
-            scale: properties.float("scale")?.unwrap_or(1.0) as f32,
+            scale: properties.float("scale")? as f32,
         };
         Self::around(properties, palettes, bumps)
     }

@@ -5,8 +5,9 @@ use glam::{Vec2, Vec3};
 
 use super::ior::Complex;
 use super::{Bsdf, BsdfSample, Lobes, fresnel};
-use crate::color::{Color, ColorModel, Role};
+use crate::color::{ColorModel, Role};
 use crate::description::Properties;
+use crate::description::declared::{Plugin, texture};
 use crate::error::Result;
 use crate::interaction::Interaction;
 use crate::texture::{Palettes, Texture};
@@ -19,6 +20,18 @@ pub struct Conductor<C: ColorModel> {
 }
 
 impl<C: ColorModel> Conductor<C> {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "a smooth metal",
+        properties: &[
+            super::ior::CONDUCTOR,
+            &[texture(
+                "specular_reflectance",
+                1.0,
+                "factor on what is reflected",
+            )],
+        ],
+    };
+
     pub(super) fn build(properties: &Properties<'_>, palettes: &Palettes<C>) -> Result<Self> {
         Ok(Self {
             index: Complex::build(properties, palettes)?,
@@ -26,7 +39,6 @@ impl<C: ColorModel> Conductor<C> {
                 properties,
                 "specular_reflectance",
                 Role::Reflectance,
-                Color::Grey(1.0),
             )?,
         })
     }

@@ -7,6 +7,7 @@ use glam::{Vec2, Vec3};
 use super::{Bsdf, BsdfSample, BsdfValue, Lobes, PhongTerms};
 use crate::color::{Color, ColorModel, Role, Spectral};
 use crate::description::Properties;
+use crate::description::declared::{Plugin, texture};
 use crate::error::Result;
 use crate::interaction::Interaction;
 use crate::math::warp;
@@ -19,15 +20,20 @@ pub struct Diffuse<C: ColorModel> {
 }
 
 impl<C: ColorModel> Diffuse<C> {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "matte",
+        properties: &[&[texture(
+            "reflectance",
+            0.5,
+            "the share of light that is reflected",
+        )]],
+    };
+
     pub(super) fn build(properties: &Properties<'_>, palettes: &Palettes<C>) -> Result<Self> {
-        let default = Color::Grey(0.5);
         Ok(Self {
-            reflectance: palettes.colors.texture(
-                properties,
-                "reflectance",
-                Role::Reflectance,
-                default,
-            )?,
+            reflectance: palettes
+                .colors
+                .texture(properties, "reflectance", Role::Reflectance)?,
         })
     }
 

@@ -7,7 +7,8 @@ use std::f32::consts::{FRAC_1_PI, PI, TAU};
 use glam::{Vec2, Vec3};
 
 use super::microfacet::{Distribution, Kind, Shape};
-use crate::color::{Color, ColorModel, Mono, Role, Spectral};
+use crate::color::{ColorModel, Mono, Role, Spectral};
+use crate::description::declared::{Row, float, number as number_row, texture};
 use crate::description::{Properties, Property, Value};
 use crate::error::Result;
 use crate::interaction::Interaction;
@@ -27,25 +28,47 @@ pub(super) struct Parameters<C: ColorModel> {
     flatness: Texture<Mono>,
 }
 
+/// What both materials read.
+pub(super) const PROPERTIES: &[Row] = &[
+    texture("base_color", 0.5, "the surface's colour"),
+    number_row("roughness", 0.5, "from a mirror to matte"),
+    number_row("anisotropic", 0.0, "how far highlights are stretched"),
+    number_row("spec_trans", 0.0, "0 is opaque, 1 is glass"),
+    number_row("spec_tint", 0.0, "how far highlights take on the colour"),
+    number_row("sheen", 0.0, "light at flat angles, as of cloth"),
+    number_row("sheen_tint", 0.0, "how far that takes on the colour"),
+    number_row(
+        "flatness",
+        0.0,
+        "blends with an approximation of subsurface scattering",
+    ),
+];
+
+/// How often a lobe is sampled, beside the others.
+pub(super) const fn sampling_rate(name: &'static str) -> Row {
+    float(
+        name,
+        1.0,
+        "how often this lobe is sampled, beside the others",
+    )
+    .positive()
+}
+
 impl<C: ColorModel> Parameters<C> {
-    /// Each is 0 where a scene does not give it, but for `base_color` and `roughness`, 0.5.
     pub(super) fn build(properties: &Properties<'_>, palettes: &Palettes<C>) -> Result<Self> {
-        let number = |name, default| palettes.numbers.number(properties, name, default);
+        let number = |name| palettes.numbers.number(properties, name);
         Ok(Self {
             color: palettes.colors.color.clone(),
-            base_color: palettes.colors.texture(
-                properties,
-                "base_color",
-                Role::Reflectance,
-                Color::Grey(0.5),
-            )?,
-            roughness: number("roughness", 0.5)?,
-            anisotropic: number("anisotropic", 0.0)?,
-            spec_trans: number("spec_trans", 0.0)?,
-            spec_tint: number("spec_tint", 0.0)?,
-            sheen: number("sheen", 0.0)?,
-            sheen_tint: number("sheen_tint", 0.0)?,
-            flatness: number("flatness", 0.0)?,
+            base_color: palettes
+                .colors
+                .texture(properties, "base_color", Role::Reflectance)?,
+            roughness: number("roughness")?,
+            anisotropic: number("anisotropic")?,
+            spec_trans: number("spec_trans")?,
+            spec_tint: number("spec_tint")?,
+            sheen: number("sheen")?,
+            sheen_tint: number("sheen_tint")?,
+            flatness: number("flatness")?,
         })
     }
 
@@ -86,14 +109,9 @@ pub(super) fn in_use(properties: &Properties<'_>, name: &'static str) -> bool {
     )
 }
 
-/// A sampling rate, 1 where the scene gives none.
+/// A sampling rate.
 pub(super) fn rate(properties: &Properties<'_>, name: &'static str) -> Result<f32> {
-    let rate = properties.float(name)?.unwrap_or(1.0);
-    if rate > 0.0 {
-        Ok(rate as f32)
-    } else {
-        Err(properties.error(name, format!("{name} must be positive, and {rate} is not")))
-    }
+    Ok(properties.float(name)? as f32)
 }
 
 /// The parameters at a point of a surface.

@@ -4,7 +4,8 @@
 
 use super::fresnel;
 use crate::color::{Color, ColorModel, Role};
-use crate::description::{Properties, Property, Value};
+use crate::description::declared::{Row, string, substance, texture};
+use crate::description::{Properties, Value};
 use crate::error::{Error, Result};
 use crate::interaction::Interaction;
 use crate::texture::{Palettes, Texture};
@@ -36,16 +37,33 @@ const SUBSTANCES: &[(&str, f64)] = &[
     ("diamond", 2.419),
 ];
 
-/// The index on the inside over that on the outside: `int_ior`, by default that of the substance
-/// `interior`, over `ext_ior`, by default air's.
-pub(super) fn relative(properties: &Properties<'_>, interior: &str) -> Result<f32> {
-    let inside = index(properties, "int_ior", interior)?;
-    Ok((inside / index(properties, "ext_ior", "air")?) as f32)
+/// The indices on both sides of a boundary.
+pub(super) const fn dielectric(interior: &'static str) -> [Row; 2] {
+    [
+        substance("int_ior", interior, "index of refraction on the inside").positive(),
+        substance("ext_ior", "air", "index of refraction on the outside").positive(),
+    ]
+}
+
+/// A metal's index.
+pub(super) const CONDUCTOR: &[Row] = &[
+    string(
+        "material",
+        "none",
+        "a metal by its symbol, such as Au; none is a perfect mirror",
+    ),
+    texture("eta", 0.0, "the index's real part; not beside material"),
+    texture("k", 1.0, "the extinction coefficient"),
+];
+
+/// The index on the inside over that on the outside.
+pub(super) fn relative(properties: &Properties<'_>) -> Result<f32> {
+    Ok((index(properties, "int_ior")? / index(properties, "ext_ior")?) as f32)
 }
 
 /// As [`relative`], for models that need the two to differ.
-pub(super) fn relative_and_different(properties: &Properties<'_>, interior: &str) -> Result<f32> {
-    let eta = relative(properties, interior)?;
+pub(super) fn relative_and_different(properties: &Properties<'_>) -> Result<f32> {
+    let eta = relative(properties)?;
     if eta == 1.0 {
         let message =
             "int_ior and ext_ior must differ: an interface between equal media is invisible";
@@ -56,19 +74,12 @@ pub(super) fn relative_and_different(properties: &Properties<'_>, interior: &str
     Ok(eta)
 }
 
-fn index(properties: &Properties<'_>, name: &'static str, default: &str) -> Result<f64> {
-    let index = match properties.value(name) {
-        Some(Property {
-            value: Value::String(substance),
-            ..
-        }) => substance_index(substance).map_err(|e| e.at(properties.location()))?,
-        Some(_) => properties.float(name)?.expect("the property is there"),
-        None => substance_index(default)?,
-    };
-    if index > 0.0 {
-        Ok(index)
-    } else {
-        Err(properties.error(name, format!("{name} must be positive, and {index} is not")))
+fn index(properties: &Properties<'_>, name: &'static str) -> Result<f64> {
+    let given = properties.value(name).map(|property| &property.value);
+    match given {
+        None | Some(Value::String(_)) => substance_index(properties.string(name)?)
+            .map_err(|error| error.at(properties.location())),
+        Some(_) => properties.float(name),
     }
 }
 
@@ -101,8 +112,9 @@ pub(super) struct Complex<C: ColorModel> {
 impl<C: ColorModel> Complex<C> {
     /// From `eta` and `k`, by default those of a perfect mirror (0 and 1), or from `material`.
     pub(super) fn build(properties: &Properties<'_>, palettes: &Palettes<C>) -> Result<Self> {
-        let material = properties.string("material")?.filter(|m| *m != "none");
-        if let Some(name) = material {
+        let material = properties.string("material")?;
+        if material != "none" {
+            let name = material;
             if properties.has("eta") {
                 return Err(properties.error("eta", "give either material or eta and k"));
             }
@@ -118,15 +130,10 @@ impl<C: ColorModel> Complex<C> {
                 k: uniform(k)?,
             });
         }
-        let texture = |name, default| {
-            let default = Color::Grey(default);
-            palettes
-                .colors
-                .texture(properties, name, Role::Quantity, default)
-        };
+        let texture = |name| palettes.colors.texture(properties, name, Role::Quantity);
         Ok(Self {
-            eta: texture("eta", 0.0)?,
-            k: texture("k", 1.0)?,
+            eta: texture("eta")?,
+            k: texture("k")?,
         })
     }
 }

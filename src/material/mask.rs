@@ -4,7 +4,8 @@ use glam::{Vec2, Vec3};
 
 use super::{Bsdf, BsdfSample, BsdfValue, Lobes, Material, PhongTerms, fraction, nested};
 use crate::color::{ColorModel, Mono, Spectral};
-use crate::description::Properties;
+use crate::description::declared::{Plugin, nested as nested_row, number};
+use crate::description::{Kind, Properties};
 use crate::error::Result;
 use crate::interaction::Interaction;
 use crate::texture::{Palettes, Texture};
@@ -17,10 +18,22 @@ pub struct Mask<C: ColorModel> {
 }
 
 impl<C: ColorModel> Mask<C> {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "a material with holes",
+        properties: &[&[
+            number(
+                "opacity",
+                0.5,
+                "the share of light that meets the material, clamped to [0, 1]",
+            ),
+            nested_row(Kind::Bsdf, "the material"),
+        ]],
+    };
+
     pub(super) fn build(properties: &Properties<'_>, palettes: &Palettes<C>) -> Result<Self> {
         let mut nested = nested(properties, palettes, 1..=1)?;
         Ok(Self {
-            opacity: palettes.numbers.number(properties, "opacity", 0.5)?,
+            opacity: palettes.numbers.number(properties, "opacity")?,
             nested: Box::new(nested.remove(0)),
         })
     }

@@ -12,6 +12,7 @@ use glam::{Vec2, Vec3};
 
 use crate::color::Mono;
 use crate::description::Properties;
+use crate::description::declared::{Row, boolean, choice, number};
 use crate::error::Result;
 use crate::interaction::Interaction;
 use crate::math::erf::{erf, erf_inverse};
@@ -27,7 +28,34 @@ pub(super) enum Shape {
     Ggx,
 }
 
-/// The properties `distribution` (beckmann or ggx) and `sample_visible` (true).
+/// Which facets there are.
+pub(super) const KIND: &[Row] = &[
+    choice(
+        "distribution",
+        &["beckmann", "ggx"],
+        "of the facets' normals; ggx has longer tails",
+    ),
+    boolean(
+        "sample_visible",
+        true,
+        "whether facets are drawn as they are seen",
+    ),
+];
+
+/// The same with a roughness that may be stretched.
+pub(super) const STRETCHED: &[Row] = &[
+    KIND[0],
+    KIND[1],
+    number(
+        "alpha",
+        DEFAULT_ALPHA,
+        "roughness, at least 0.0001; not beside alpha_u and alpha_v",
+    ),
+    number("alpha_u", DEFAULT_ALPHA, "roughness along the tangent").absent("alpha"),
+    number("alpha_v", DEFAULT_ALPHA, "roughness across it").absent("alpha"),
+];
+
+/// Which distribution, and how it is drawn from.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Kind {
     pub(super) shape: Shape,
@@ -36,19 +64,13 @@ pub(super) struct Kind {
 
 impl Kind {
     pub(super) fn build(properties: &Properties<'_>) -> Result<Self> {
-        let name = properties.string("distribution")?.unwrap_or("beckmann");
-        let shape = match name.to_lowercase().as_str() {
-            "beckmann" => Shape::Beckmann,
+        let shape = match properties.choice("distribution")? {
             "ggx" => Shape::Ggx,
-            _ => {
-                let message = format!("unknown distribution \"{name}\"");
-                let error = properties.error("distribution", message);
-                return Err(error.help("there are beckmann and ggx"));
-            }
+            _ => Shape::Beckmann,
         };
         Ok(Self {
             shape,
-            sample_visible: properties.boolean("sample_visible")?.unwrap_or(true),
+            sample_visible: properties.boolean("sample_visible")?,
         })
     }
 }
@@ -73,9 +95,9 @@ impl Roughness {
             return Err(properties.error("", "alpha_u and alpha_v come together"));
         }
         let name = if stretched { "alpha_u" } else { "alpha" };
-        let alpha_u = numbers.number(properties, name, DEFAULT_ALPHA)?;
+        let alpha_u = numbers.number(properties, name)?;
         let alpha_v = stretched
-            .then(|| numbers.number(properties, "alpha_v", DEFAULT_ALPHA))
+            .then(|| numbers.number(properties, "alpha_v"))
             .transpose()?;
         Ok(Self {
             kind,

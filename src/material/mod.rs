@@ -199,7 +199,7 @@ pub trait Bsdf<C: ColorModel>: std::fmt::Debug + Send + Sync {
 family! {
     /// Every material there is.
     #[derive(Clone, Debug)]
-    pub enum Material<C>: Bsdf, kind "bsdf", context Palettes<C> {
+    pub enum Material<C>: Bsdf, context Palettes<C> {
         "blendbsdf" => BlendBsdf(blendbsdf::BlendBsdf<C>),
         "bumpmap" => BumpMap(bumpmap::BumpMap<C>),
         "conductor" => Conductor(conductor::Conductor<C>),

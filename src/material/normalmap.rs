@@ -4,8 +4,9 @@
 use glam::Vec3;
 
 use super::perturbed::{Normals, Perturbed};
-use crate::color::{Color, ColorModel, Rgb, Role};
+use crate::color::{ColorModel, Rgb, Role};
 use crate::description::Properties;
+use crate::description::declared::{Plugin, map};
 use crate::error::Result;
 use crate::interaction::Interaction;
 use crate::texture::{Palettes, Texture};
@@ -18,13 +19,23 @@ pub(super) type NormalMap<C> = Perturbed<C, Mapped>;
 pub struct Mapped(Texture<Rgb>);
 
 impl<C: ColorModel> NormalMap<C> {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "normals from a texture",
+        properties: &[
+            super::perturbed::PROPERTIES,
+            &[map(
+                "normalmap",
+                "normals in the shading frame, from [−1, 1] to [0, 1]",
+            )],
+        ],
+    };
+
     pub(super) fn build(properties: &Properties<'_>, palettes: &Palettes<C>) -> Result<Self> {
         if properties.object("normalmap")?.is_none() {
-            return Err(properties.error("", "normalmap needs a texture of the same name"));
+            return Err(properties.missing("normalmap"));
         }
-        let flat = Color::Rgb([0.5, 0.5, 1.0]);
         let vectors = &palettes.vectors;
-        let normals = Mapped(vectors.texture(properties, "normalmap", Role::Quantity, flat)?);
+        let normals = Mapped(vectors.texture(properties, "normalmap", Role::Quantity)?);
         Self::around(properties, palettes, normals)
     }
 }

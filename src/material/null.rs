@@ -5,6 +5,7 @@ use glam::{Vec2, Vec3};
 use super::{Bsdf, BsdfSample, Lobes};
 use crate::color::{ColorModel, Spectral};
 use crate::description::Properties;
+use crate::description::declared::Plugin;
 use crate::error::Result;
 use crate::interaction::Interaction;
 use crate::texture::Palettes;
@@ -14,6 +15,11 @@ use crate::texture::Palettes;
 pub struct Null;
 
 impl Null {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "nothing: light passes",
+        properties: &[],
+    };
+
     pub(super) fn build<C: ColorModel>(
         _properties: &Properties<'_>,
         _palettes: &Palettes<C>,

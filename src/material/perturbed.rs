@@ -6,7 +6,8 @@ use glam::{Vec2, Vec3};
 
 use super::{Bsdf, BsdfSample, BsdfValue, Lobes, Material, PhongTerms, nested};
 use crate::color::ColorModel;
-use crate::description::Properties;
+use crate::description::declared::{Row, boolean, nested as nested_row};
+use crate::description::{Kind, Properties};
 use crate::error::Result;
 use crate::interaction::Interaction;
 use crate::math::Frame;
@@ -27,6 +28,21 @@ pub struct Perturbed<C: ColorModel, N> {
     use_shadowing_function: bool,
 }
 
+/// What both materials read.
+pub(super) const PROPERTIES: &[Row] = &[
+    boolean(
+        "flip_invalid_normals",
+        true,
+        "whether normals that face away are turned over",
+    ),
+    boolean(
+        "use_shadowing_function",
+        true,
+        "whether bumps hide light at flat angles",
+    ),
+    nested_row(Kind::Bsdf, "the material"),
+];
+
 impl<C: ColorModel, N: Normals> Perturbed<C, N> {
     pub(super) fn around(
         properties: &Properties<'_>,
@@ -34,12 +50,11 @@ impl<C: ColorModel, N: Normals> Perturbed<C, N> {
         normals: N,
     ) -> Result<Self> {
         let mut nested = nested(properties, palettes, 1..=1)?;
-        let switch = |name| Ok::<_, crate::error::Error>(properties.boolean(name)?.unwrap_or(true));
         Ok(Self {
             normals,
             nested: Box::new(nested.remove(0)),
-            flip_invalid_normals: switch("flip_invalid_normals")?,
-            use_shadowing_function: switch("use_shadowing_function")?,
+            flip_invalid_normals: properties.boolean("flip_invalid_normals")?,
+            use_shadowing_function: properties.boolean("use_shadowing_function")?,
         })
     }
 

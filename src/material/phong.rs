@@ -12,8 +12,9 @@ use std::f32::consts::{FRAC_1_PI, TAU};
 use glam::{Vec2, Vec3};
 
 use super::{Bsdf, BsdfSample, BsdfValue, Lobes, PhongTerms, fresnel, mean, samples};
-use crate::color::{Color, ColorModel, Mono, Role, Spectral};
+use crate::color::{ColorModel, Mono, Role, Spectral};
 use crate::description::Properties;
+use crate::description::declared::{Plugin, number, texture};
 use crate::error::Result;
 use crate::interaction::Interaction;
 use crate::math::{Frame, warp};
@@ -33,16 +34,21 @@ pub struct Phong<C: ColorModel> {
 }
 
 impl<C: ColorModel> Phong<C> {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "Phong's, normalised under path and as textbooks have it under the integrator phong",
+        properties: &[&[
+            texture("diffuse_reflectance", 0.5, "k_d"),
+            texture("specular_reflectance", 0.2, "k_s"),
+            texture("ambient_reflectance", 0.0, "k_a, of the light ambient"),
+            number("exponent", 30.0, "n; the larger, the smaller the highlight").at_least(0.0),
+        ]],
+    };
+
     pub(super) fn build(properties: &Properties<'_>, palettes: &Palettes<C>) -> Result<Self> {
-        let reflectance = |name, default| {
-            let default = Color::Grey(default);
-            palettes
-                .colors
-                .texture(properties, name, Role::Reflectance, default)
-        };
-        let diffuse_reflectance = reflectance("diffuse_reflectance", 0.5)?;
-        let specular_reflectance = reflectance("specular_reflectance", 0.2)?;
-        let exponent = palettes.numbers.number(properties, "exponent", 30.0)?;
+        let reflectance = |name| palettes.colors.texture(properties, name, Role::Reflectance);
+        let diffuse_reflectance = reflectance("diffuse_reflectance")?;
+        let specular_reflectance = reflectance("specular_reflectance")?;
+        let exponent = palettes.numbers.number(properties, "exponent")?;
         if let Some(low) = samples(&Mono, &exponent).map(|n| n[0]).find(|n| *n < 0.0) {
             let message = format!("an exponent must be at least 0, and {low} is not");
             return Err(properties.error("exponent", message));
@@ -55,7 +61,7 @@ impl<C: ColorModel> Phong<C> {
         let [diffuse, specular] =
             [&diffuse_reflectance, &specular_reflectance].map(|t| mean(palettes, t));
         Ok(Self {
-            ambient_reflectance: reflectance("ambient_reflectance", 0.0)?,
+            ambient_reflectance: reflectance("ambient_reflectance")?,
             diffuse_reflectance,
             specular_reflectance,
             exponent,

@@ -9,8 +9,9 @@ use std::f32::consts::FRAC_1_PI;
 use glam::{Vec2, Vec3};
 
 use super::{Bsdf, BsdfSample, BsdfValue, Lobes, fresnel, ior, mean};
-use crate::color::{Color, ColorModel, Role, Spectral};
+use crate::color::{ColorModel, Role, Spectral};
 use crate::description::Properties;
+use crate::description::declared::{Plugin, Row, boolean, texture};
 use crate::error::Result;
 use crate::interaction::Interaction;
 use crate::math::warp;
@@ -35,6 +36,21 @@ pub(super) struct Base<C: ColorModel> {
     nonlinear: bool,
 }
 
+/// What both plastics read.
+pub(super) const PROPERTIES: &[Row] = &[
+    texture("diffuse_reflectance", 0.5, "of the base"),
+    texture(
+        "specular_reflectance",
+        1.0,
+        "factor on what the coat reflects",
+    ),
+    boolean(
+        "nonlinear",
+        false,
+        "whether light that returns to the base takes on its colour again",
+    ),
+];
+
 impl<C: ColorModel> Base<C> {
     pub(super) fn build(
         properties: &Properties<'_>,
@@ -47,11 +63,10 @@ impl<C: ColorModel> Base<C> {
                 properties,
                 "diffuse_reflectance",
                 Role::Reflectance,
-                Color::Grey(0.5),
             )?,
             eta,
             internal_reflectance,
-            nonlinear: properties.boolean("nonlinear")?.unwrap_or(false),
+            nonlinear: properties.boolean("nonlinear")?,
         })
     }
 
@@ -91,16 +106,19 @@ pub(super) fn coat_probability(reflectance: f32, specular_weight: f32) -> f32 {
 }
 
 impl<C: ColorModel> Plastic<C> {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "a matte base under a clear, smooth coat",
+        properties: &[&super::ior::dielectric("polypropylene"), PROPERTIES],
+    };
+
     pub(super) fn build(properties: &Properties<'_>, palettes: &Palettes<C>) -> Result<Self> {
-        let eta = ior::relative(properties, "polypropylene")?;
+        let eta = ior::relative(properties)?;
         let internal_reflectance = fresnel::diffuse_reflectance(1.0 / eta);
         let base = Base::build(properties, palettes, eta, internal_reflectance)?;
-        let specular_reflectance = palettes.colors.texture(
-            properties,
-            "specular_reflectance",
-            Role::Reflectance,
-            Color::Grey(1.0),
-        )?;
+        let specular_reflectance =
+            palettes
+                .colors
+                .texture(properties, "specular_reflectance", Role::Reflectance)?;
         Ok(Self {
             specular_weight: base.specular_weight(palettes, &specular_reflectance),
             base,

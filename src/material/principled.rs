@@ -5,11 +5,14 @@
 
 use glam::{Vec2, Vec3};
 
-use super::disney::{Coat, Parameters, Point, in_use, normal_reflectance, number, rate, schlick};
+use super::disney::{
+    Coat, Parameters, Point, in_use, normal_reflectance, number, rate, sampling_rate, schlick,
+};
 use super::microfacet::Interface;
 use super::{Bsdf, BsdfSample, BsdfValue, Lobes, fresnel};
 use crate::color::{ColorModel, Mono, Spectral};
 use crate::description::Properties;
+use crate::description::declared::{Plugin, float, number as number_row};
 use crate::error::Result;
 use crate::interaction::Interaction;
 use crate::math::warp;
@@ -50,9 +53,33 @@ struct Shares {
 }
 
 impl<C: ColorModel> Principled<C> {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "Disney's material",
+        properties: &[
+            super::disney::PROPERTIES,
+            &[
+                number_row("metallic", 0.0, "0 is a dielectric, 1 a metal"),
+                number_row("clearcoat", 0.0, "how strong a second, clear coat is"),
+                number_row("clearcoat_gloss", 0.0, "how smooth it is"),
+                float("eta", 1.5, "index of refraction, inside over outside")
+                    .positive()
+                    .absent("from specular"),
+                float(
+                    "specular",
+                    0.5,
+                    "reflectance along the normal, over 0.08; not beside eta",
+                )
+                .between(0.0, 12.49),
+                sampling_rate("main_specular_sampling_rate"),
+                sampling_rate("clearcoat_sampling_rate"),
+                sampling_rate("diffuse_reflectance_sampling_rate"),
+            ],
+        ],
+    };
+
     pub(super) fn build(properties: &Properties<'_>, palettes: &Palettes<C>) -> Result<Self> {
         let transmits = in_use(properties, "spec_trans");
-        let number = |name| palettes.numbers.number(properties, name, 0.0);
+        let number = |name| palettes.numbers.number(properties, name);
         Ok(Self {
             parameters: Parameters::build(properties, palettes)?,
             metallic: number("metallic")?,
@@ -116,26 +143,17 @@ impl<C: ColorModel> Principled<C> {
 
 /// The index of refraction, inside over outside.
 fn index(properties: &Properties<'_>, transmits: bool) -> Result<f32> {
-    let eta = properties.float("eta")?;
-    let specular = properties.float("specular")?;
-    let positive = |name, value: f64, ok: bool| {
-        let message = format!("{name} cannot be {value}");
-        if ok {
-            Ok(value)
-        } else {
-            Err(properties.error(name, message))
-        }
-    };
+    let eta = properties.given::<f64>("eta")?;
+    let specular = properties.given::<f64>("specular")?;
     Ok(match (eta, specular) {
         (Some(_), Some(_)) => {
             return Err(properties.error("specular", "give either eta or specular"));
         }
         // Equal indices would leave a refraction without facets.
         (Some(1.0), None) if transmits => 1.001,
-        (Some(eta), None) => positive("eta", eta, eta > 0.0)? as f32,
-        (None, specular) => {
-            let specular = specular.unwrap_or(0.5);
-            let specular = positive("specular", specular, (0.0..12.5).contains(&specular))?;
+        (Some(eta), None) => eta as f32,
+        (None, _) => {
+            let specular = properties.float("specular")?;
             let least = if transmits { 1e-3 } else { 0.0 };
             (2.0 / (1.0 - (0.08 * specular.max(least)).sqrt()) - 1.0) as f32
         }

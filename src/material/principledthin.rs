@@ -4,11 +4,14 @@
 
 use glam::{Vec2, Vec3};
 
-use super::disney::{Parameters, Point, in_use, lerp, normal_reflectance, number, rate, schlick};
+use super::disney::{
+    Parameters, Point, in_use, lerp, normal_reflectance, number, rate, sampling_rate, schlick,
+};
 use super::microfacet::Distribution;
 use super::{Bsdf, BsdfSample, BsdfValue, Lobes, fresnel};
 use crate::color::{ColorModel, Mono, Spectral};
 use crate::description::Properties;
+use crate::description::declared::{Plugin, number as number_row};
 use crate::error::Result;
 use crate::interaction::Interaction;
 use crate::math::warp;
@@ -37,12 +40,27 @@ struct Shares {
 }
 
 impl<C: ColorModel> PrincipledThin<C> {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "Disney's material for thin sheets",
+        properties: &[
+            super::disney::PROPERTIES,
+            &[
+                number_row("eta", 1.5, "index of refraction, inside over outside"),
+                number_row("diff_trans", 0.0, "matte transmission: 0 is none, 2 is all"),
+                sampling_rate("specular_reflectance_sampling_rate"),
+                sampling_rate("specular_transmittance_sampling_rate"),
+                sampling_rate("diffuse_reflectance_sampling_rate"),
+                sampling_rate("diffuse_transmittance_sampling_rate"),
+            ],
+        ],
+    };
+
     pub(super) fn build(properties: &Properties<'_>, palettes: &Palettes<C>) -> Result<Self> {
-        let number = |name, default| palettes.numbers.number(properties, name, default);
+        let number = |name| palettes.numbers.number(properties, name);
         Ok(Self {
             parameters: Parameters::build(properties, palettes)?,
-            eta: number("eta", 1.5)?,
-            diff_trans: number("diff_trans", 0.0)?,
+            eta: number("eta")?,
+            diff_trans: number("diff_trans")?,
             specular_reflectance_rate: rate(properties, "specular_reflectance_sampling_rate")?,
             specular_transmittance_rate: rate(properties, "specular_transmittance_sampling_rate")?,
             diffuse_reflectance_rate: rate(properties, "diffuse_reflectance_sampling_rate")?,

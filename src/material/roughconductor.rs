@@ -7,8 +7,9 @@ use glam::{Vec2, Vec3};
 use super::ior::Complex;
 use super::microfacet::Roughness;
 use super::{Bsdf, BsdfSample, BsdfValue, Lobes, fresnel};
-use crate::color::{Color, ColorModel, Role};
+use crate::color::{ColorModel, Role};
 use crate::description::Properties;
+use crate::description::declared::{Plugin, texture};
 use crate::error::Result;
 use crate::interaction::Interaction;
 use crate::texture::{Palettes, Texture};
@@ -22,6 +23,19 @@ pub struct RoughConductor<C: ColorModel> {
 }
 
 impl<C: ColorModel> RoughConductor<C> {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "a rough metal",
+        properties: &[
+            super::ior::CONDUCTOR,
+            super::microfacet::STRETCHED,
+            &[texture(
+                "specular_reflectance",
+                1.0,
+                "factor on what is reflected",
+            )],
+        ],
+    };
+
     pub(super) fn build(properties: &Properties<'_>, palettes: &Palettes<C>) -> Result<Self> {
         Ok(Self {
             roughness: Roughness::build(properties, &palettes.numbers)?,
@@ -30,7 +44,6 @@ impl<C: ColorModel> RoughConductor<C> {
                 properties,
                 "specular_reflectance",
                 Role::Reflectance,
-                Color::Grey(1.0),
             )?,
         })
     }

@@ -6,8 +6,9 @@ use glam::{Vec2, Vec3};
 
 use super::microfacet::{Distribution, Interface, Roughness};
 use super::{Bsdf, BsdfSample, BsdfValue, Lobes, fresnel, ior};
-use crate::color::{Color, ColorModel, Role};
+use crate::color::{ColorModel, Role};
 use crate::description::Properties;
+use crate::description::declared::{Plugin, texture};
 use crate::error::Result;
 use crate::interaction::Interaction;
 use crate::texture::{Palettes, Texture};
@@ -23,16 +24,27 @@ pub struct RoughDielectric<C: ColorModel> {
 }
 
 impl<C: ColorModel> RoughDielectric<C> {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "rough glass",
+        properties: &[
+            &super::ior::dielectric("bk7"),
+            super::microfacet::STRETCHED,
+            &[
+                texture("specular_reflectance", 1.0, "factor on what is reflected"),
+                texture(
+                    "specular_transmittance",
+                    1.0,
+                    "factor on what is let through",
+                ),
+            ],
+        ],
+    };
+
     pub(super) fn build(properties: &Properties<'_>, palettes: &Palettes<C>) -> Result<Self> {
-        let factor = |name| {
-            let one = Color::Grey(1.0);
-            palettes
-                .colors
-                .texture(properties, name, Role::Reflectance, one)
-        };
+        let factor = |name| palettes.colors.texture(properties, name, Role::Reflectance);
         Ok(Self {
             roughness: Roughness::build(properties, &palettes.numbers)?,
-            eta: ior::relative_and_different(properties, "bk7")?,
+            eta: ior::relative_and_different(properties)?,
             specular_reflectance: factor("specular_reflectance")?,
             specular_transmittance: factor("specular_transmittance")?,
         })

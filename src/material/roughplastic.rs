@@ -7,11 +7,12 @@ use std::sync::Arc;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
-use super::microfacet::{DEFAULT_ALPHA, Distribution, Kind};
+use super::microfacet::{Distribution, Kind};
 use super::plastic::{Base, coat_probability};
 use super::{Bsdf, BsdfSample, BsdfValue, Lobes, fresnel, ior};
-use crate::color::{Color, ColorModel, Role};
+use crate::color::{ColorModel, Role};
 use crate::description::Properties;
+use crate::description::declared::{Plugin, float};
 use crate::error::Result;
 use crate::interaction::Interaction;
 use crate::math::{quadrature, warp};
@@ -37,10 +38,24 @@ fn cosine(i: usize) -> f32 {
 }
 
 impl<C: ColorModel> RoughPlastic<C> {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "a matte base under a clear, rough coat",
+        properties: &[
+            &super::ior::dielectric("polypropylene"),
+            super::plastic::PROPERTIES,
+            super::microfacet::KIND,
+            &[float(
+                "alpha",
+                super::microfacet::DEFAULT_ALPHA,
+                "roughness of the coat, at least 0.0001",
+            )],
+        ],
+    };
+
     pub(super) fn build(properties: &Properties<'_>, palettes: &Palettes<C>) -> Result<Self> {
-        let eta = ior::relative_and_different(properties, "polypropylene")?;
+        let eta = ior::relative_and_different(properties)?;
         let kind = Kind::build(properties)?;
-        let alpha = properties.float("alpha")?.unwrap_or(DEFAULT_ALPHA) as f32;
+        let alpha = properties.float("alpha")? as f32;
         let visible = Kind {
             sample_visible: true,
             ..kind
@@ -53,12 +68,10 @@ impl<C: ColorModel> RoughPlastic<C> {
         let inside = table(reflectance, 1.0 / eta);
         let internal: f32 = inside.iter().enumerate().map(|(i, r)| cosine(i) * r).sum();
         let base = Base::build(properties, palettes, eta, internal * 2.0 / STEPS as f32)?;
-        let specular_reflectance = palettes.colors.texture(
-            properties,
-            "specular_reflectance",
-            Role::Reflectance,
-            Color::Grey(1.0),
-        )?;
+        let specular_reflectance =
+            palettes
+                .colors
+                .texture(properties, "specular_reflectance", Role::Reflectance)?;
         Ok(Self {
             distribution: Distribution::new(kind, alpha, alpha),
             transmittance: table(transmittance, eta).into(),

@@ -6,8 +6,9 @@
 use glam::{Vec2, Vec3};
 
 use super::{Bsdf, BsdfSample, Lobes, fresnel, ior};
-use crate::color::{Color, ColorModel, Role};
+use crate::color::{ColorModel, Role};
 use crate::description::Properties;
+use crate::description::declared::{Plugin, texture};
 use crate::error::Result;
 use crate::interaction::Interaction;
 use crate::texture::{Palettes, Texture};
@@ -22,15 +23,25 @@ pub struct ThinDielectric<C: ColorModel> {
 }
 
 impl<C: ColorModel> ThinDielectric<C> {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "a thin pane of glass",
+        properties: &[
+            &super::ior::dielectric("bk7"),
+            &[
+                texture("specular_reflectance", 1.0, "factor on what is reflected"),
+                texture(
+                    "specular_transmittance",
+                    1.0,
+                    "factor on what is let through",
+                ),
+            ],
+        ],
+    };
+
     pub(super) fn build(properties: &Properties<'_>, palettes: &Palettes<C>) -> Result<Self> {
-        let factor = |name| {
-            let one = Color::Grey(1.0);
-            palettes
-                .colors
-                .texture(properties, name, Role::Reflectance, one)
-        };
+        let factor = |name| palettes.colors.texture(properties, name, Role::Reflectance);
         Ok(Self {
-            eta: ior::relative(properties, "bk7")?,
+            eta: ior::relative(properties)?,
             specular_reflectance: factor("specular_reflectance")?,
             specular_transmittance: factor("specular_transmittance")?,
         })

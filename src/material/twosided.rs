@@ -4,7 +4,8 @@ use glam::{Vec2, Vec3};
 
 use super::{Bsdf, BsdfSample, BsdfValue, Lobes, Material, PhongTerms, nested};
 use crate::color::ColorModel;
-use crate::description::Properties;
+use crate::description::declared::{Plugin, boolean, nested as nested_row};
+use crate::description::{Kind, Properties};
 use crate::error::Result;
 use crate::interaction::Interaction;
 use crate::texture::Palettes;
@@ -18,9 +19,22 @@ pub struct TwoSided<C: ColorModel> {
 }
 
 impl<C: ColorModel> TwoSided<C> {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "a material on both sides, or one on each",
+        properties: &[&[
+            nested_row(Kind::Bsdf, "the material, or the front's and the back's"),
+            boolean(
+                "allow_transmission",
+                false,
+                "whether materials may let light through",
+            ),
+        ]],
+    };
+
     pub(super) fn build(properties: &Properties<'_>, palettes: &Palettes<C>) -> Result<Self> {
         let sides = nested(properties, palettes, 1..=2)?;
-        if sides.iter().any(|side| side.lobes().transmission) {
+        let allowed = properties.boolean("allow_transmission")?;
+        if !allowed && sides.iter().any(|side| side.lobes().transmission) {
             let message =
                 "twosided takes materials that only reflect, and one of these transmits light";
             return Err(properties

@@ -290,9 +290,9 @@ mod tests {
     fn a_gltf_file_is_seen_through_its_own_camera() {
         let scene = describe("camera.gltf", GLTF);
         let sensor = scene.root().children(Kind::Sensor)[0];
-        let fov = sensor.float("fov").unwrap().unwrap();
+        let fov = sensor.float("fov").unwrap();
         assert!((fov - 0.5f64.to_degrees()).abs() < 1e-5);
-        let to_world = sensor.transform("to_world").unwrap().unwrap();
+        let to_world = sensor.transform("to_world").unwrap();
         let near = |a: DVec3, b: DVec3| assert!(a.distance(b) < 1e-9, "{a}");
         near(
             to_world.transform_point3(DVec3::ZERO),
@@ -326,7 +326,7 @@ mod tests {
             let bare = describe_mesh(&path, UpAxis::Y, &Options::default());
             let scene = bare.unwrap().description;
             let shape = scene.root().children(Kind::Shape)[2];
-            assert_eq!(shape.boolean("materials").unwrap(), Some(true));
+            assert_eq!(shape.boolean("materials").unwrap(), true);
             let diffuse = shape.children(Kind::Bsdf)[0].children(Kind::Bsdf)[0];
             let textures = diffuse.children(Kind::Texture);
             let plugins = textures.iter().map(|t| t.plugin().to_owned());

@@ -2,9 +2,9 @@
 //! sensors, materials and lights are built, and no tree.
 
 use super::options::Options;
-use super::prepare;
 use super::progress::Progress;
 use super::session::{Task, start};
+use super::{plugins, prepare};
 use crate::accel::Method;
 use crate::color::ColorModel;
 use crate::description::{Description, Kind};
@@ -59,10 +59,9 @@ impl Task for Check<'_> {
                 problems.take(scene::check_materials(description, color));
             }
         }
-        // Whoever failed has not read all that it would have read.
-        if problems.is_empty() {
-            problems.extend(description.unread());
-        }
+        let findings = plugins::examine(description);
+        problems.extend(findings.problems);
+        warnings.extend(findings.notes);
         problems.finish()?;
         Ok(warnings)
     }

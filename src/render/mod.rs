@@ -16,6 +16,7 @@ mod info;
 mod memory;
 mod pinned;
 mod plan;
+mod plugins;
 mod prepare;
 mod samples;
 mod session;
@@ -42,6 +43,7 @@ pub use memory::{check_mesh, human_bytes};
 pub use options::{Adaptive, Checkpoint, Colors, Options, Overrides};
 pub(crate) use pinned::pin;
 pub use plan::Completed;
+pub use plugins::{Listed, plugins};
 pub use progress::{Phase, Progress, Silent};
 pub use session::Session;
 

@@ -4,6 +4,7 @@ use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::time::Duration;
 
+use super::plugins::plugins;
 use crate::accel::{Build, Method};
 use crate::description::{Description, Kind, NodeId, Value};
 use crate::sensor::Window;
@@ -93,7 +94,7 @@ impl Overrides {
         let root = description.root().node_id();
         let integrator = description.child_or_new(root, Kind::Integrator, "path");
         if let Some(plugin) = &self.integrator {
-            description.replace(integrator, plugin);
+            replace(description, integrator, plugin);
         }
         if let Some(depth) = self.max_depth {
             let innermost = innermost(description, integrator);
@@ -120,12 +121,22 @@ impl Overrides {
         }
         let sampler = description.child_or_new(sensor, Kind::Sampler, "independent");
         if let Some(plugin) = &self.sampler {
-            description.replace(sampler, plugin);
+            replace(description, sampler, plugin);
         }
         if let Some(spp) = self.spp {
             description.set(sampler, "sample_count", Value::Integer(spp.into()));
         }
     }
+}
+
+/// Makes a node another plugin, which keeps what it knows of the old one's properties.
+fn replace(description: &mut Description, id: NodeId, plugin: &str) {
+    let kind = description.node(id).kind();
+    let listed = plugins();
+    let table = listed.iter().find(|p| p.kind == kind && p.name == plugin);
+    description.replace(id, plugin, |property| {
+        table.is_some_and(|listed| listed.plugin.row(&property.name).is_some())
+    });
 }
 
 /// The integrator inside a wrapper such as `moment`.

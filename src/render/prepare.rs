@@ -10,6 +10,7 @@ use super::fingerprint::{self, Fingerprint};
 use super::memory::{self, Estimate};
 use super::options::{Colors, Options};
 use super::plan::Completed;
+use super::plugins;
 use super::progress::{Phase, Progress};
 use super::{Report, Seconds, timed};
 use crate::accel::{Build, CacheUse, Method, Recipe};
@@ -312,12 +313,7 @@ pub(super) fn prepare<'k, C: ColorModel>(
     });
     let share = share.unwrap_or_default();
     let film = share.film;
-    if kept.as_ref().is_some_and(|kept| kept.key == key) {
-        // The equal scene was built from the equal properties, all of them.
-        for property in description.root().all() {
-            property.mark_read();
-        }
-    } else {
+    if kept.as_ref().is_none_or(|kept| kept.key != key) {
         *kept = None;
         let source = Source { description, given };
         let made = make(source, options, color, share, progress);
@@ -328,14 +324,9 @@ pub(super) fn prepare<'k, C: ColorModel>(
             spent,
         });
     }
-    if view.is_some() && kept.is_some() {
-        problems.extend(description.unread());
-    }
-    if let Err(error) = problems.finish() {
-        // Unread properties are told again the next time.
-        *kept = None;
-        return Err(error);
-    }
+    let findings = plugins::examine(description);
+    problems.extend(findings.problems);
+    problems.finish()?;
     let (Some(view), Some(kept)) = (view, kept.as_ref()) else {
         unreachable!("a part that is missing is a problem");
     };
@@ -348,6 +339,7 @@ pub(super) fn prepare<'k, C: ColorModel>(
     }
     .check(options.memory_limit)?;
     let mut warnings = description.warnings().to_vec();
+    warnings.extend(findings.notes);
     warnings.extend(facts.warnings.iter().cloned());
     warnings.extend(view.warnings.iter().cloned());
     Ok(Job {

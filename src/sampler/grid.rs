@@ -8,6 +8,7 @@ use glam::Vec2;
 use super::stratified::Stratified;
 use super::{PointSet, Sampler};
 use crate::description::Properties;
+use crate::description::declared::Plugin;
 use crate::error::Result;
 
 /// Strata without jitter; a set is the whole sample count, rounded up to a square.
@@ -17,6 +18,11 @@ pub struct Grid {
 }
 
 impl Grid {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "a regular grid, which aliases",
+        properties: &[super::COMMON],
+    };
+
     pub(super) fn build(properties: &Properties<'_>, _context: &()) -> Result<Self> {
         let count = super::sample_count(properties)?;
         Ok(Self::new(count))

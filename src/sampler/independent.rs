@@ -4,6 +4,7 @@ use glam::Vec2;
 
 use super::{PointSet, Sampler, sample_count, units};
 use crate::description::Properties;
+use crate::description::declared::Plugin;
 use crate::error::Result;
 use crate::math::random;
 
@@ -14,6 +15,11 @@ pub struct Independent {
 }
 
 impl Independent {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "random points",
+        properties: &[super::COMMON],
+    };
+
     pub(super) fn build(properties: &Properties<'_>, _context: &()) -> Result<Self> {
         Ok(Self {
             count: sample_count(properties)?,

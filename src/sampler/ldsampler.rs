@@ -8,6 +8,7 @@ use glam::Vec2;
 use super::digits::{fraction, second};
 use super::{PointSet, Sampler, place, sample_count};
 use crate::description::Properties;
+use crate::description::declared::Plugin;
 use crate::error::Result;
 use crate::math::random;
 
@@ -18,6 +19,11 @@ pub struct LdSampler {
 }
 
 impl LdSampler {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "a (0, 2)-sequence, every pair of dimensions by itself",
+        properties: &[super::COMMON],
+    };
+
     pub(super) fn build(properties: &Properties<'_>, _context: &()) -> Result<Self> {
         Ok(Self::new(sample_count(properties)?))
     }

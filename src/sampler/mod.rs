@@ -19,8 +19,9 @@ mod tests;
 use glam::Vec2;
 
 use crate::description::Properties;
+use crate::description::declared::{Row, boolean, integer};
 use crate::error::{Problem, Result};
-use crate::family::family;
+use crate::family::{self, family};
 use crate::math::random;
 
 /// What every sampler does.
@@ -43,7 +44,7 @@ pub trait PointSet: std::fmt::Debug + Send + Sync {
 family! {
     /// Every sampler there is.
     #[derive(Clone, Debug)]
-    pub enum Sampler: PointSet, kind "sampler", context () {
+    pub enum Sampler: PointSet, context () {
         "grid" => Grid(grid::Grid),
         "independent" => Independent(independent::Independent),
         "ldsampler" => LdSampler(ldsampler::LdSampler),
@@ -71,7 +72,8 @@ impl Sampler {
 
     /// The note that the count which `properties` ask for was rounded up, where it was.
     pub fn rounding(&self, properties: &Properties<'_>) -> Result<Option<Problem>> {
-        let (wanted, count) = (sample_count(properties)?, self.sample_count());
+        let properties = family::declared(properties, Self::PLUGINS.iter().copied())?;
+        let (wanted, count) = (sample_count(&properties)?, self.sample_count());
         let name = properties.plugin();
         let error = properties.error(
             "sample_count",
@@ -82,20 +84,28 @@ impl Sampler {
     }
 }
 
-/// `sample_count`, 4 by default; a sampler reads it and may round it up. The `seed` is the command line's.
+/// What every sampler reads.
+const COMMON: &[Row] = &[
+    integer(
+        "sample_count",
+        4,
+        "samples per pixel, which the sampler may round up",
+    )
+    .between(1.0, MAX_SAMPLES as f64),
+    integer("seed", 0, "the command line's --seed takes its place").without_effect(),
+];
+
+/// The samples a pixel that a scene asks for.
 fn sample_count(properties: &Properties<'_>) -> Result<u32> {
-    properties.ignore("seed");
-    let count = properties.integer("sample_count")?.unwrap_or(4);
-    u32::try_from(count)
-        .ok()
-        .filter(|c| (1..=MAX_SAMPLES).contains(c))
-        .ok_or_else(|| {
-            properties.error(
-                "sample_count",
-                format!("{count} samples; 1 to {MAX_SAMPLES} are possible"),
-            )
-        })
+    Ok(properties.integer("sample_count")? as u32)
 }
+
+/// Whether points lie anywhere in their strata.
+const JITTER: Row = boolean(
+    "jitter",
+    true,
+    "points anywhere in their strata, and not at the centres",
+);
 
 /// The most samples a pixel can have.
 pub const MAX_SAMPLES: u32 = 1 << 30;

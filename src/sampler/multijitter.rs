@@ -9,6 +9,7 @@ use glam::Vec2;
 use super::stratified::{jittered, offset};
 use super::{PointSet, Sampler, below_one, place, sample_count};
 use crate::description::Properties;
+use crate::description::declared::Plugin;
 use crate::error::Result;
 use crate::math::random;
 
@@ -22,12 +23,14 @@ pub struct MultiJitter {
 }
 
 impl MultiJitter {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "one point in each cell of a grid, and in each column and row",
+        properties: &[super::COMMON, &[super::JITTER]],
+    };
+
     pub(super) fn build(properties: &Properties<'_>, _context: &()) -> Result<Self> {
         let count = sample_count(properties)?;
-        Ok(Self::new(
-            count,
-            properties.boolean("jitter")?.unwrap_or(true),
-        ))
+        Ok(Self::new(count, properties.boolean("jitter")?))
     }
 
     fn new(count: u32, jitter: bool) -> Self {

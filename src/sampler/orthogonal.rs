@@ -10,6 +10,7 @@ use glam::Vec2;
 use super::stratified::offset;
 use super::{PointSet, Sampler, below_one, place, sample_count};
 use crate::description::Properties;
+use crate::description::declared::{Plugin, Row, integer};
 use crate::error::{Error, Result};
 use crate::math::random;
 
@@ -23,9 +24,17 @@ pub struct Orthogonal {
     jitter: bool,
 }
 
+const STRENGTH: Row = integer("strength", 2, "of the arrays; only 2 is possible here");
+
 impl Orthogonal {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "one point in each cell of a grid in every pair of dimensions",
+        properties: &[super::COMMON, &[super::JITTER, STRENGTH]],
+    };
+
     pub(super) fn build(properties: &Properties<'_>, _context: &()) -> Result<Self> {
-        if let Some(strength) = properties.integer("strength")?.filter(|&s| s != 2) {
+        let strength = properties.integer("strength")?;
+        if strength != 2 {
             let message =
                 format!("orthogonal arrays of strength {strength} do not exist in Étendue");
             return Err(Error::unsupported(message)
@@ -33,10 +42,7 @@ impl Orthogonal {
                 .help("they have strength 2, the default"));
         }
         let count = sample_count(properties)?;
-        Ok(Self::new(
-            count,
-            properties.boolean("jitter")?.unwrap_or(true),
-        ))
+        Ok(Self::new(count, properties.boolean("jitter")?))
     }
 
     fn new(count: u32, jitter: bool) -> Self {

@@ -12,6 +12,7 @@ use glam::Vec2;
 use super::digits::{SEQUENCES, fraction, scramble, shuffle, sobol};
 use super::{PointSet, Sampler, place, sample_count};
 use crate::description::Properties;
+use crate::description::declared::Plugin;
 use crate::error::Result;
 use crate::math::random;
 
@@ -30,6 +31,11 @@ pub struct Sobol {
 }
 
 impl Sobol {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "Sobol' points with Owen's scrambling, sixteen dimensions jointly",
+        properties: &[super::COMMON],
+    };
+
     pub(super) fn build(properties: &Properties<'_>, _context: &()) -> Result<Self> {
         Ok(Self::new(sample_count(properties)?))
     }

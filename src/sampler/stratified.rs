@@ -6,6 +6,7 @@ use glam::Vec2;
 
 use super::{PointSet, Sampler, below_one, place, sample_count, units};
 use crate::description::Properties;
+use crate::description::declared::Plugin;
 use crate::error::Result;
 use crate::math::random;
 
@@ -19,12 +20,14 @@ pub struct Stratified {
 }
 
 impl Stratified {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "jittered: one point in each cell of a grid",
+        properties: &[super::COMMON, &[super::JITTER]],
+    };
+
     pub(super) fn build(properties: &Properties<'_>, _context: &()) -> Result<Self> {
         let count = sample_count(properties)?;
-        Ok(Self::new(
-            count,
-            properties.boolean("jitter")?.unwrap_or(true),
-        ))
+        Ok(Self::new(count, properties.boolean("jitter")?))
     }
 
     pub(super) fn new(count: u32, jitter: bool) -> Self {

@@ -183,6 +183,7 @@ impl<'a> Plan<'a> {
                 .error("", message)
                 .help("place copies as instances of a shapegroup"));
         }
+        let properties = shape::declared(&properties)?;
         let plugin = properties.plugin();
         if let (Some(group), shape::GROUP | shape::INSTANCE) = (space.shapegroup, plugin) {
             let message = format!("a shapegroup cannot hold a shape {plugin:?}");
@@ -212,11 +213,10 @@ impl<'a> Plan<'a> {
 
     /// Notes the shapes of a node of the scene graph. Nodes are not nested without end.
     fn node(&mut self, properties: &Properties<'a>, space: &Space<'a>) -> Result<()> {
-        shape::check_strict(properties)?;
         let own = properties.transform("to_world")?;
         let bsdf = properties.child(Kind::Bsdf)?;
         let inner = Space {
-            outer: own.map_or(space.outer, |own| space.outer * own),
+            outer: space.outer * own,
             bsdf: bsdf.map(|bsdf| bsdf.node_id()).or(space.bsdf),
             top: false,
             ..*space
@@ -268,7 +268,7 @@ impl<'a> Plan<'a> {
                 .related(group.location(), "this"));
         }
         let own = properties.transform("to_world")?;
-        let matrix = own.map_or(space.outer, |own| space.outer * own);
+        let matrix = space.outer * own;
         let to_world = Transform::new(&matrix).ok_or_else(|| {
             properties.error("to_world", "the transform must be affine and invertible")
         })?;
@@ -295,17 +295,9 @@ mod tests {
     use crate::description::Options;
 
     fn load(text: &str) -> Result<Assets> {
-        let (assets, unread) = load_in_part(text)?;
-        assert_eq!(unread, []);
-        Ok(assets)
-    }
-
-    /// The assets, and what loading them did not read.
-    fn load_in_part(text: &str) -> Result<(Assets, Vec<Problem>)> {
         let text = format!(r#"<scene version="3.0.0">{text}</scene>"#);
         let scene = Description::parse(&text, Path::new("test.xml"), &Options::default())?;
-        let assets = Assets::load(&scene, None, None, &|| ())?;
-        Ok((assets, scene.unread()))
+        Assets::load(&scene, None, None, &|| ())
     }
 
     #[test]
@@ -329,7 +321,7 @@ mod tests {
 
     #[test]
     fn a_node_s_matrix_is_its_parent_s_times_its_own_and_materials_are_inherited() {
-        let (assets, unread) = load_in_part(
+        let assets = load(
             r#"<bsdf type="diffuse" id="outer"/><bsdf type="diffuse" id="inner"/><bsdf type="diffuse" id="own"/>
                <shape type="group"><ref id="outer"/>
                    <transform name="to_world"><scale value="2"/></transform>
@@ -346,11 +338,6 @@ mod tests {
                    <transform name="to_world"><translate x="7"/></transform><shape type="disk"/></shape></shape>"#,
         )
         .unwrap();
-        assert_eq!(
-            unread.len(),
-            2,
-            "a disk's own material and emitter: {unread:?}"
-        );
         let places: Vec<(u32, f32, f64)> = (assets.shapes.iter())
             .map(|s| {
                 let bounds = s.geometry.bounds(0);

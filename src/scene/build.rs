@@ -75,7 +75,7 @@ impl<C: ColorModel> Builder<'_, C> {
         let mesh = geometry.mesh();
         let has = |name: &str| mesh.is_some_and(|m| m.attributes.iter().any(|a| a.name == name));
         if let (Kind::Texture, "mesh_attribute") = (user.kind(), user.plugin())
-            && let Ok(Some(name)) = user.string("name")
+            && let Some(Value::String(name)) = self.description.get(user.node_id(), "name")
             && !has(name)
         {
             let attributes = mesh.map_or(&[][..], |m| &m.attributes);
@@ -107,7 +107,7 @@ impl<C: ColorModel> Builder<'_, C> {
             .flatten();
         let own = self.problems.take(properties.child(Kind::Bsdf)).flatten();
         let bsdf = own.or_else(|| Some(self.description.node(member.bsdf?)));
-        let displacement = properties.peek_children(Kind::Texture);
+        let displacement = properties.children(Kind::Texture);
         for user in emitter.into_iter().chain(bsdf).chain(displacement) {
             self.check_attributes(properties, geometry, &user);
         }
@@ -173,11 +173,11 @@ pub fn check_materials<C: ColorModel>(description: &Description, color: C) -> Re
 pub fn light_names(description: &Description) -> Vec<String> {
     let root = description.root();
     let mut names = LightNames::default();
-    for shape in root.peek_children(Kind::Shape) {
+    for shape in root.children(Kind::Shape) {
         names.visit(&shape);
     }
-    for light in root.peek_children(Kind::Emitter) {
-        if light.peek_plugin() != "ambient" {
+    for light in root.children(Kind::Emitter) {
+        if light.plugin() != "ambient" {
             names.add(light.id());
         }
     }
@@ -195,11 +195,11 @@ struct LightNames {
 impl LightNames {
     /// In the order in which [`Assets::load`] flattens groups, and no further than it does.
     fn visit(&mut self, shape: &Properties<'_>) {
-        for light in shape.peek_children(Kind::Emitter) {
+        for light in shape.children(Kind::Emitter) {
             self.add(light.id().or(shape.id()));
         }
-        if shape.peek_plugin() == shape::NODE {
-            for child in shape.peek_children(Kind::Shape) {
+        if shape.plugin() == shape::NODE {
+            for child in shape.children(Kind::Shape) {
                 self.visited += 1;
                 if self.visited > MAX_SHAPES {
                     return;

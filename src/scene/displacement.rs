@@ -15,7 +15,7 @@ use crate::description::{Description, Properties};
 use crate::error::{Problem, Problems, Result};
 use crate::interaction::Interaction;
 use crate::mesh::{Mesh, Seams};
-use crate::shape::{Bounds, Geometry, TriangleMesh, Untessellated};
+use crate::shape::{self, Bounds, Geometry, TriangleMesh, Untessellated};
 use crate::texture::{Palette, Texture};
 
 /// The properties; the others have no use without the first.
@@ -73,7 +73,7 @@ impl Assets {
 
 impl<'a> Displacement<'a> {
     fn read(properties: Properties<'a>, palette: &Palette<Mono>) -> Result<Option<Self>> {
-        properties.own(&OWN)?;
+        let properties = shape::declared(&properties)?;
         if properties.value(HEIGHT).is_none() {
             return match OWN.iter().find(|name| properties.has(name)) {
                 None => Ok(None),
@@ -82,15 +82,12 @@ impl<'a> Displacement<'a> {
                     .help(r#"add <texture name="displacement" type="bitmap">"#)),
             };
         }
-        let longest_edge = properties.float("displacement_edge")?;
-        if longest_edge.is_some_and(|edge| edge <= 0.0) {
-            return Err(properties.error("displacement_edge", "an edge's length is positive"));
-        }
+        let longest_edge = properties.given::<f64>("displacement_edge")?;
         Ok(Some(Self {
             properties,
-            height: palette.number(&properties, HEIGHT, 0.0)?,
-            scale: properties.float("displacement_scale")?.unwrap_or(1.0),
-            offset: properties.float("displacement_offset")?.unwrap_or(0.0),
+            height: palette.number(&properties, HEIGHT)?,
+            scale: properties.float("displacement_scale")?,
+            offset: properties.float("displacement_offset")?,
             longest_edge: longest_edge.map(|edge| edge as f32),
         }))
     }
@@ -186,13 +183,9 @@ mod tests {
     use crate::image::{self, Image, Metadata};
     use crate::mesh::Report;
 
-    fn displaced_in(folder: &Path, shape: &str, strict: bool) -> Result<(Vec<Mesh>, Vec<Problem>)> {
+    fn displaced_in(folder: &Path, shape: &str) -> Result<(Vec<Mesh>, Vec<Problem>)> {
         let text = format!(r#"<scene version="3.0.0">{shape}</scene>"#);
-        let options = Options {
-            strict,
-            ..Options::default()
-        };
-        let scene = Description::parse(&text, &folder.join("test.xml"), &options)?;
+        let scene = Description::parse(&text, &folder.join("test.xml"), &Options::default())?;
         let mut assets = Assets::load(&scene, None, None, &|| ())?;
         assets.displace(&scene, Some(1_000_000))?;
         crate::scene::build(
@@ -201,7 +194,6 @@ mod tests {
             crate::color::Rgb,
             crate::accel::Method::Brute,
         )?;
-        assert_eq!(scene.unread(), []);
         let meshes = assets
             .shapes
             .iter()
@@ -212,7 +204,7 @@ mod tests {
     /// A shape of that plugin with these properties.
     fn displaced(plugin: &str, properties: &str) -> Result<(Mesh, Vec<Problem>)> {
         let shape = format!(r#"<shape type="{plugin}">{properties}</shape>"#);
-        let (mut meshes, warnings) = displaced_in(Path::new(""), &shape, false)?;
+        let (mut meshes, warnings) = displaced_in(Path::new(""), &shape)?;
         Ok((meshes.remove(0), warnings))
     }
 
@@ -304,7 +296,7 @@ mod tests {
         ramp(folder.path());
         let scale = r#"<float name="displacement_scale" value="0.8"/>"#;
         let shape = format!(r#"<shape type="rectangle">{BITMAP}{scale}{EDGE}</shape>"#);
-        let (meshes, _) = displaced_in(folder.path(), &shape, false).unwrap();
+        let (meshes, _) = displaced_in(folder.path(), &shape).unwrap();
         let slope = Vec2::new(0.4, 0.2);
         let expected = (-slope).extend(1.0).normalize();
         let inner = |p: &glam::Vec3| p.truncate().abs().max_element() < 0.9;
@@ -330,7 +322,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         ramp(folder.path());
         let shape = format!(r#"<shape type="sphere">{BITMAP}{EDGE}</shape>"#);
-        let (meshes, warnings) = displaced_in(folder.path(), &shape, false).unwrap();
+        let (meshes, warnings) = displaced_in(folder.path(), &shape).unwrap();
         assert!(Report::of(&meshes[0]).closed);
         assert!(
             warnings[0]
@@ -357,7 +349,7 @@ mod tests {
             let shape = format!(
                 r#"<shape type="ply"><string name="filename" value="ball.ply"/>{texture}</shape>"#
             );
-            displaced_in(folder.path(), &shape, false)
+            displaced_in(folder.path(), &shape)
         };
         let lift = r#"<texture name="displacement" type="mesh_attribute"><string name="name" value="vertex_lift"/></texture>"#;
         let (meshes, _) = ball(lift).unwrap();
@@ -402,10 +394,5 @@ mod tests {
             let error = displaced(plugin, properties).unwrap_err().to_string();
             assert!(error.contains(message), "{plugin}: {error}");
         }
-        let strict = format!(r#"<shape type="rectangle">{QUARTER}</shape>"#);
-        let error = displaced_in(Path::new(""), &strict, true)
-            .unwrap_err()
-            .to_string();
-        assert!(error.contains("Étendue's own"), "{error}");
     }
 }

@@ -1,8 +1,9 @@
 //! `hdrfilm`: size, crop window, pixel format, reconstruction filter, and whether samples beyond the edges count
 //! (`sample_border`); plain settings, for the sums themselves are kept by `render`.
 
+use crate::description::declared::{Plugin, Plugins, boolean, choice, integer, nested, string};
 use crate::description::{Kind, Properties};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::family;
 use crate::filter::Filter;
 
@@ -103,17 +104,9 @@ impl PixelFormat {
     }
 
     fn build(properties: &Properties<'_>) -> Result<Self> {
-        const NAME: &str = "pixel_format";
-        let wanted = properties.string(NAME)?.unwrap_or("rgb").to_lowercase();
-        let names = Self::NAMED.map(|(name, _)| name);
-        match Self::NAMED.iter().find(|(name, _)| *name == wanted) {
-            Some((_, format)) => Ok(*format),
-            None => {
-                let error = properties.error(NAME, format!("unknown pixel format \"{wanted}\""));
-                let help = format!("there are {}", names.join(", "));
-                Err(error.suggest(&wanted, names).help(help))
-            }
-        }
+        let name = properties.choice("pixel_format")?;
+        let format = Self::NAMED.iter().find(|(known, _)| *known == name);
+        Ok(format.expect("every choice is a format").1)
     }
 }
 
@@ -156,7 +149,42 @@ impl Default for Film {
 }
 
 /// The most pixels along one side.
-const MAX_SIDE: i64 = 1 << 16;
+const MAX_SIDE: f64 = 65536.0;
+
+/// The film plugins.
+pub const FILMS: Plugins = &[("hdrfilm", &HDRFILM)];
+
+const HDRFILM: Plugin = Plugin {
+    about: "linear pixels of unlimited range; what is written follows from the output's name",
+    properties: &[&[
+        integer("width", 768, "pixels across the full film").between(1.0, MAX_SIDE),
+        integer("height", 576, "pixels down the full film").between(1.0, MAX_SIDE),
+        integer("crop_offset_x", 0, "left edge of what is rendered").between(0.0, MAX_SIDE),
+        integer("crop_offset_y", 0, "upper edge of what is rendered").between(0.0, MAX_SIDE),
+        integer("crop_width", 768, "pixels across what is rendered")
+            .between(1.0, MAX_SIDE)
+            .absent("width"),
+        integer("crop_height", 576, "pixels down what is rendered")
+            .between(1.0, MAX_SIDE)
+            .absent("height"),
+        choice(
+            "pixel_format",
+            &["rgb", "rgba", "luminance", "luminance_alpha", "xyz", "xyza"],
+            "which channels the image has",
+        ),
+        boolean(
+            "sample_border",
+            false,
+            "whether samples beyond the edge count there too",
+        ),
+        string("file_format", "openexr", "how Mitsuba writes its file").without_effect(),
+        string("component_format", "float16", "how Mitsuba writes its file").without_effect(),
+        boolean("banner", true, "how Mitsuba writes its file").without_effect(),
+        boolean("compensate", false, "how Mitsuba adds samples up").without_effect(),
+        nested(Kind::Filter, "how samples reach the pixels around them"),
+    ]],
+};
+
 /// The most pixels of a crop.
 const MAX_PIXELS: u64 = 1 << 28;
 
@@ -206,31 +234,18 @@ impl Film {
 
     /// From the film inside a sensor.
     pub fn build(properties: &Properties<'_>) -> Result<Self> {
-        const NAMES: &[&str] = &["hdrfilm"];
-        if properties.plugin() != NAMES[0] {
-            return Err(family::unknown(
-                properties,
-                "film",
-                properties.plugin(),
-                NAMES,
-            ));
-        }
-        let side = |name: &'static str, default: i64, least: i64| -> Result<u32> {
-            let n = properties.integer(name)?.unwrap_or(default);
-            if !(least..=MAX_SIDE).contains(&n) {
-                return Err(properties.error(
-                    name,
-                    format!("{n} pixels; {least} to {MAX_SIDE} are possible"),
-                ));
-            }
-            Ok(n as u32)
+        let properties = &family::declared(properties, FILMS.iter().copied())?;
+        let side = |name| Ok::<_, Error>(properties.integer(name)? as u32);
+        let part = |name, whole: u32| -> Result<u32> {
+            let given = properties.given::<i64>(name)?;
+            Ok(given.map_or(whole, |n| n as u32))
         };
-        let (width, height) = (side("width", 768, 1)?, side("height", 576, 1)?);
+        let (width, height) = (side("width")?, side("height")?);
         let crop = Window {
-            x: side("crop_offset_x", 0, 0)?,
-            y: side("crop_offset_y", 0, 0)?,
-            width: side("crop_width", i64::from(width), 1)?,
-            height: side("crop_height", i64::from(height), 1)?,
+            x: side("crop_offset_x")?,
+            y: side("crop_offset_y")?,
+            width: part("crop_width", width)?,
+            height: part("crop_height", height)?,
         };
         let full = Window {
             x: 0,
@@ -260,10 +275,6 @@ impl Film {
                 .help("render it in crops"));
         }
         let pixel_format = PixelFormat::build(properties)?;
-        // How Mitsuba writes its file; what Étendue writes follows from the output's name.
-        for name in ["file_format", "component_format", "banner", "compensate"] {
-            properties.ignore(name);
-        }
         let filter = match properties.child(Kind::Filter)? {
             Some(child) => Filter::build(&child, &())?,
             None => Filter::default(),
@@ -274,7 +285,7 @@ impl Film {
             crop,
             pixel_format,
             filter,
-            sample_border: properties.boolean("sample_border")?.unwrap_or(false),
+            sample_border: properties.boolean("sample_border")?,
         })
     }
 }

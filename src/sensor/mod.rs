@@ -5,16 +5,17 @@ mod orthographic;
 mod perspective;
 mod thinlens;
 
-use glam::{DMat4, Mat4, Vec2, Vec3};
+use glam::{Mat4, Vec2, Vec3};
 
-use crate::description::Properties;
+use crate::description::declared::{Row, float, nested, transform};
+use crate::description::{Kind, Properties};
 use crate::error::Result;
 use crate::family::family;
 use crate::interaction::Ray;
 use crate::math::Transform;
 
-pub use film::{Coordinates, Film, PixelFormat, Window};
-pub(crate) use perspective::tangent_x;
+pub use film::{Coordinates, FILMS, Film, PixelFormat, Window};
+pub(crate) use perspective::{FIELD_OF_VIEW, tangent_x};
 
 /// What every sensor does.
 pub trait Camera: std::fmt::Debug + Send + Sync {
@@ -39,7 +40,7 @@ pub trait Camera: std::fmt::Debug + Send + Sync {
 family! {
     /// Every sensor there is.
     #[derive(Clone, Debug)]
-    pub enum Sensor: Camera, kind "sensor", context Film {
+    pub enum Sensor: Camera, context Film {
         "orthographic" => Orthographic(orthographic::Orthographic),
         "perspective" => Perspective(perspective::Perspective),
         "thinlens" => ThinLens(thinlens::ThinLens),
@@ -55,31 +56,38 @@ struct Mount {
     shutter: (f32, f32),
 }
 
+/// What every sensor reads.
+const MOUNT: &[Row] = &[
+    transform(
+        "to_world",
+        "from camera space (z forward, y up, x to the left) to the world",
+    ),
+    float("near_clip", 1e-2, "what is nearer is not seen; scene units").positive(),
+    float("far_clip", 1e4, "what is farther is not seen; scene units").positive(),
+    float("shutter_open", 0.0, "when light begins to count"),
+    float("shutter_close", 0.0, "when it ends").absent("shutter_open"),
+    nested(Kind::Film, "size, pixel format and filter"),
+    nested(Kind::Sampler, "where samples lie, and how many"),
+    nested(Kind::Medium, "what the sensor stands in: ignored").without_effect(),
+];
+
 impl Mount {
     fn build(properties: &Properties<'_>) -> Result<Self> {
-        let matrix = properties.transform("to_world")?.unwrap_or(DMat4::IDENTITY);
+        let matrix = properties.transform("to_world")?;
         let Some(to_world) = Transform::new(&matrix) else {
             return Err(properties.error(
                 "to_world",
                 "the sensor's transform must be affine and invertible",
             ));
         };
-        let near = properties.float("near_clip")?.unwrap_or(1e-2);
-        let far = properties.float("far_clip")?.unwrap_or(1e4);
-        if near <= 0.0 {
-            return Err(properties.error(
-                "near_clip",
-                format!("near_clip must be positive, and {near} is not"),
-            ));
-        }
+        let near = properties.float("near_clip")?;
+        let far = properties.float("far_clip")?;
         if far <= near {
             let message = format!("far_clip ({far}) must be greater than near_clip ({near})");
             return Err(properties.error("far_clip", message));
         }
-        // Of effect where there is a lens; all cameras have it, so that one can be exchanged for another.
-        properties.float("focus_distance")?;
-        let open = properties.float("shutter_open")?.unwrap_or(0.0);
-        let close = properties.float("shutter_close")?.unwrap_or(open);
+        let open = properties.float("shutter_open")?;
+        let close = properties.given("shutter_close")?.unwrap_or(open);
         if close < open {
             let message = format!("shutter_close ({close}) lies before shutter_open ({open})");
             return Err(properties.error("shutter_close", message));

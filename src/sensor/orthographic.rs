@@ -5,6 +5,7 @@ use glam::{Mat4, Vec2, Vec3, Vec4};
 
 use super::{Camera, Film, Mount};
 use crate::description::Properties;
+use crate::description::declared::{Plugin, float};
 use crate::error::Result;
 use crate::interaction::Ray;
 
@@ -17,6 +18,16 @@ pub struct Orthographic {
 }
 
 impl Orthographic {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "parallel rays; the film covers [−1, 1] in x",
+        properties: &[
+            super::MOUNT,
+            &[float("focus_distance", 1e4, "everything is sharp")
+                .positive()
+                .without_effect()],
+        ],
+    };
+
     pub(super) fn build(properties: &Properties<'_>, film: &Film) -> Result<Self> {
         let half = Vec2::new(1.0, 1.0 / film.aspect() as f32);
         Ok(Self {

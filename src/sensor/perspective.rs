@@ -7,7 +7,8 @@ use glam::{Mat4, Vec2, Vec3, Vec4};
 
 use super::{Camera, Film, Mount};
 use crate::description::Properties;
-use crate::error::Result;
+use crate::description::declared::{Plugin, Row, choice, float, string};
+use crate::error::{Error, Result};
 use crate::interaction::Ray;
 
 /// A pinhole camera.
@@ -23,11 +24,28 @@ pub struct Perspective {
 /// Half the diagonal of 35 mm film (36 × 24 mm), in mm.
 const HALF_DIAGONAL: f64 = 21.633_307_652_783_937;
 
+/// How wide the view is.
+pub(crate) const FIELD_OF_VIEW: &[Row] = &[
+    float("fov", 0.0, "field of view in degrees, below 180")
+        .above_to(180.0)
+        .absent("from focal_length"),
+    choice(
+        "fov_axis",
+        &["x", "y", "diagonal", "smaller", "larger"],
+        "along which side of the film fov is meant",
+    ),
+    string(
+        "focal_length",
+        "50mm",
+        "as on 35 mm film, whose diagonal it takes; not beside fov",
+    ),
+];
+
 /// The tangent of half the horizontal field of view.
 pub(crate) fn tangent_x(properties: &Properties<'_>, aspect: f64) -> Result<f64> {
     let diagonal = (1.0 + 1.0 / (aspect * aspect)).sqrt();
-    let Some(fov) = properties.float("fov")? else {
-        let text = properties.string("focal_length")?.unwrap_or("50mm");
+    let Some(fov) = properties.given::<f64>("fov")? else {
+        let text = properties.string("focal_length")?;
         let length = text.trim().trim_end_matches("mm").trim().parse::<f64>();
         return match length {
             Ok(f) if f > 0.0 && f.is_finite() => Ok(HALF_DIAGONAL / f / diagonal),
@@ -39,15 +57,11 @@ pub(crate) fn tangent_x(properties: &Properties<'_>, aspect: f64) -> Result<f64>
     if properties.has("focal_length") {
         return Err(properties.error("focal_length", "fov and focal_length exclude each other"));
     }
-    if !(fov > 0.0 && fov < 180.0) {
-        return Err(properties.error(
-            "fov",
-            format!("a field of view of {fov}° is not between 0° and 180°"),
-        ));
+    if fov == 180.0 {
+        return Err(properties.error("fov", "a field of view is less than 180°"));
     }
     let tangent = (fov.to_radians() / 2.0).tan();
-    Ok(match properties.string("fov_axis")?.unwrap_or("x") {
-        "x" => tangent,
+    Ok(match properties.choice("fov_axis")? {
         "y" => tangent * aspect,
         "diagonal" => tangent / diagonal,
         "smaller" => {
@@ -64,18 +78,36 @@ pub(crate) fn tangent_x(properties: &Properties<'_>, aspect: f64) -> Result<f64>
                 tangent * aspect
             }
         }
-        other => {
-            let error = properties.error("fov_axis", format!("unknown fov_axis \"{other}\""));
-            return Err(error
-                .suggest(other, ["diagonal", "smaller", "larger"])
-                .help("there are x, y, diagonal, smaller and larger"));
-        }
+        _ => tangent,
     })
 }
 
 impl Perspective {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "a pinhole",
+        properties: &[
+            super::MOUNT,
+            FIELD_OF_VIEW,
+            &[
+                float(
+                    "principal_point_offset_x",
+                    0.0,
+                    "shift of the picture, in widths",
+                ),
+                float(
+                    "principal_point_offset_y",
+                    0.0,
+                    "shift of the picture, in heights",
+                ),
+                float("focus_distance", 1e4, "everything is sharp")
+                    .positive()
+                    .without_effect(),
+            ],
+        ],
+    };
+
     pub(super) fn build(properties: &Properties<'_>, film: &Film) -> Result<Self> {
-        let shift = |name| Ok(properties.float(name)?.unwrap_or(0.0) as f32);
+        let shift = |name| Ok::<_, Error>(properties.float(name)? as f32);
         Ok(Self {
             principal_point: Vec2::new(
                 shift("principal_point_offset_x")?,
@@ -175,7 +207,10 @@ mod tests {
             r#"<scene version="3.0.0"><sensor type="perspective">{inside}</sensor></scene>"#
         );
         let scene = Description::parse(&text, Path::new("test.xml"), &Options::default()).unwrap();
-        Perspective::build(&scene.root().children(Kind::Sensor)[0], film)
+        Perspective::build(
+            &scene.root().children(Kind::Sensor)[0].declared(&Perspective::PLUGIN),
+            film,
+        )
     }
 
     #[test]

@@ -14,6 +14,7 @@ use glam::{Mat4, Vec2};
 use super::perspective::Perspective;
 use super::{Camera, Film};
 use crate::description::Properties;
+use crate::description::declared::{Plugin, float, integer};
 use crate::error::Result;
 use crate::interaction::Ray;
 use crate::math::warp;
@@ -34,36 +35,17 @@ struct Aperture {
     corners: Vec<Vec2>,
 }
 
-/// The most blades.
-const MAX_BLADES: i64 = 64;
-
 impl Aperture {
     fn build(properties: &Properties<'_>) -> Result<Self> {
-        let Some(radius) = properties.float("aperture_radius")? else {
+        let radius = properties.float("aperture_radius")?;
+        let blades = properties.integer("aperture_blades")?;
+        if (1..3).contains(&blades) {
+            let message = format!("{blades} blades make no polygon");
             return Err(properties
-                .error("", "a thinlens needs an aperture_radius")
-                .help("a perspective sensor sees everything sharp"));
-        };
-        if !(0.0..=f64::from(f32::MAX)).contains(&radius) {
-            return Err(properties.error(
-                "aperture_radius",
-                format!(
-                    "a radius is a number from 0 to {:e}, and {radius} is not",
-                    f32::MAX
-                ),
-            ));
-        }
-        properties.own(&["aperture_blades", "aperture_rotation"])?;
-        let blades = properties.integer("aperture_blades")?.unwrap_or(0);
-        if blades != 0 && !(3..=MAX_BLADES).contains(&blades) {
-            return Err(properties
-                .error(
-                    "aperture_blades",
-                    format!("{blades} blades; 3 to {MAX_BLADES} are possible"),
-                )
+                .error("aperture_blades", message)
                 .help("0 is a disc"));
         }
-        let rotation = properties.float("aperture_rotation")?.unwrap_or(0.0);
+        let rotation = properties.float("aperture_rotation")?;
         let corner = |i: i64| {
             let angle = rotation.to_radians() as f32 + TAU * i as f32 / blades as f32;
             // +x is to the image's left.
@@ -93,14 +75,39 @@ impl Aperture {
 }
 
 impl ThinLens {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "a lens of finite size, sharp at one distance",
+        properties: &[
+            super::MOUNT,
+            super::FIELD_OF_VIEW,
+            &[
+                float("aperture_radius", 0.0, "of the lens; scene units")
+                    .between(0.0, f32::MAX as f64)
+                    .required(),
+                float(
+                    "focus_distance",
+                    1e4,
+                    "where the image is sharp; scene units",
+                )
+                .above_to(f32::MAX as f64)
+                .absent("far_clip"),
+                integer(
+                    "aperture_blades",
+                    0,
+                    "corners of the aperture, 3 to 64; 0 is a disc",
+                )
+                .between(0.0, 64.0)
+                .own(),
+                float("aperture_rotation", 0.0, "of those corners, in degrees").own(),
+            ],
+        ],
+    };
+
     pub(super) fn build(properties: &Properties<'_>, film: &Film) -> Result<Self> {
         let pinhole = Perspective::centred(properties, film)?;
-        let focus_distance = match properties.float("focus_distance")? {
-            Some(distance) if !(distance as f32 > 0.0 && (distance as f32).is_finite()) => {
-                return Err(properties.error(
-                    "focus_distance",
-                    format!("focus_distance must be positive, and {distance} is not"),
-                ));
+        let focus_distance = match properties.given::<f64>("focus_distance")? {
+            Some(distance) if distance as f32 == 0.0 => {
+                return Err(properties.error("focus_distance", "focus_distance is too small"));
             }
             Some(distance) => distance as f32,
             None => pinhole.far(),
@@ -160,8 +167,10 @@ mod tests {
             height: 100,
             ..Film::default()
         };
-        let camera = ThinLens::build(&scene.root().children(Kind::Sensor)[0], &film)?;
-        assert_eq!(scene.unread(), []);
+        let camera = ThinLens::build(
+            &scene.root().children(Kind::Sensor)[0].declared(&ThinLens::PLUGIN),
+            &film,
+        )?;
         Ok(camera)
     }
 

@@ -8,10 +8,25 @@ use glam::DMat4;
 use super::Shape;
 use super::frustum::{self, Profile};
 use crate::description::Properties;
+use crate::description::declared::{Plugin, boolean, float, vector};
 use crate::error::Result;
 
+pub(super) const PLUGIN: Plugin = Plugin {
+    about: "a cone, closed or open",
+    properties: &[
+        super::COMMON,
+        &[
+            vector("p0", [0.0; 3], "centre of the base"),
+            vector("p1", [0.0, 0.0, 1.0], "apex"),
+            float("radius", 1.0, "of the base; scene units").positive(),
+            super::FLIP_NORMALS,
+            boolean("base", true, "whether the base is closed by a disk"),
+        ],
+    ],
+};
+
 pub(super) fn build(properties: &Properties<'_>, outer: &DMat4) -> Result<Shape> {
-    let base = properties.boolean("base")?.unwrap_or(true);
+    let base = properties.boolean("base")?;
     let closed = if base { vec![0.0] } else { Vec::new() };
     let slope = -1.0;
     frustum::build(properties, outer, Profile { slope, closed })

@@ -8,11 +8,25 @@ use glam::DMat4;
 use super::Shape;
 use super::frustum::{self, Profile};
 use crate::description::Properties;
+use crate::description::declared::{Plugin, boolean, float, vector};
 use crate::error::Result;
 
+pub(super) const PLUGIN: Plugin = Plugin {
+    about: "a cylinder, open as in Mitsuba",
+    properties: &[
+        super::COMMON,
+        &[
+            vector("p0", [0.0; 3], "centre of one end"),
+            vector("p1", [0.0, 0.0, 1.0], "centre of the other"),
+            float("radius", 1.0, "of both ends; scene units").positive(),
+            super::FLIP_NORMALS,
+            boolean("caps", false, "whether both ends are closed by disks").own(),
+        ],
+    ],
+};
+
 pub(super) fn build(properties: &Properties<'_>, outer: &DMat4) -> Result<Shape> {
-    properties.own(&["caps"])?;
-    let caps = properties.boolean("caps")?.unwrap_or(false);
+    let caps = properties.boolean("caps")?;
     let closed = if caps { vec![0.0, 1.0] } else { Vec::new() };
     let slope = 0.0;
     frustum::build(properties, outer, Profile { slope, closed })

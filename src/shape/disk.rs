@@ -9,6 +9,7 @@ use super::{
     Bounds, Chart, Geometry, Shape, Surface, SurfaceSample, area_to_solid_angle, to_world,
 };
 use crate::description::Properties;
+use crate::description::declared::Plugin;
 use crate::error::Result;
 use crate::interaction::{Hit, Interaction, Ray};
 use crate::math::{Frame, offset, warp};
@@ -24,9 +25,14 @@ pub struct Disk {
     area: f64,
 }
 
+pub(super) const PLUGIN: Plugin = Plugin {
+    about: "the unit disk at z = 0, facing +z",
+    properties: &[super::COMMON, &[super::FLIP_NORMALS]],
+};
+
 pub(super) fn build(properties: &Properties<'_>, outer: &DMat4) -> Result<Shape> {
     let to_world = DAffine3::from_mat4(to_world(properties, outer)?);
-    let flip = properties.boolean("flip_normals")?.unwrap_or(false);
+    let flip = properties.boolean("flip_normals")?;
     match Disk::new(to_world, flip) {
         Some(disk) => Ok(Geometry::Disk(disk).into()),
         None => Err(properties.error("to_world", "the disk has no finite, positive area")),

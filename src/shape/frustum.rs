@@ -42,13 +42,8 @@ pub(super) struct Profile {
 /// `to_world`.
 pub(super) fn build(properties: &Properties<'_>, outer: &DMat4, profile: Profile) -> Result<Shape> {
     let plugin = properties.plugin();
-    let end = |name, default| Ok(properties.vector(name)?.unwrap_or(default));
-    let (p0, p1) = (end("p0", DVec3::ZERO)?, end("p1", DVec3::Z)?);
-    let radius = properties.float("radius")?.unwrap_or(1.0);
-    if radius <= 0.0 {
-        let message = format!("a {plugin} needs a positive radius");
-        return Err(properties.error("radius", message));
-    }
+    let (p0, p1) = (properties.vector("p0")?, properties.vector("p1")?);
+    let radius = properties.float("radius")?;
     let Some(axis) = (p1 - p0).try_normalize() else {
         let message = format!("the ends of a {plugin} cannot be the same");
         return Err(properties.error("p1", message));
@@ -58,7 +53,7 @@ pub(super) fn build(properties: &Properties<'_>, outer: &DMat4, profile: Profile
     let s = t.cross(axis);
     let placed = DAffine3::from_cols(radius * s, radius * t, p1 - p0, p0);
     let to_world = DAffine3::from_mat4(super::to_world(properties, outer)?) * placed;
-    let flip = properties.boolean("flip_normals")?.unwrap_or(false);
+    let flip = properties.boolean("flip_normals")?;
     match Frustum::new(to_world, profile, flip) {
         Some(frustum) => Ok(Geometry::Frustum(frustum).into()),
         None => {

@@ -3,8 +3,14 @@
 //! own: Mitsuba has no such shape.
 
 use crate::description::Properties;
+use crate::description::declared::Plugin;
 use crate::error::Result;
 use crate::mesh::ReadOptions;
+
+pub(super) const PLUGIN: Plugin = Plugin {
+    about: "the default scene of a glTF or GLB file as one mesh",
+    properties: &[super::COMMON, super::MESH, super::FILE],
+};
 
 pub(super) fn options(_properties: &Properties<'_>) -> Result<ReadOptions> {
     Ok(ReadOptions::default())

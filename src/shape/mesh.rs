@@ -266,7 +266,7 @@ fn place_in(setting: &Setting<'_>, mut mesh: Mesh, properties: &Properties<'_>) 
         // A transform can carry finite corners to infinity.
         dropped = mesh.check().dropped_triangles;
     }
-    if properties.boolean("face_normals")?.unwrap_or(false) {
+    if properties.boolean("face_normals")? {
         mesh.drop_normals();
     } else if mesh.normals.is_empty() {
         match setting.cache {
@@ -277,7 +277,7 @@ fn place_in(setting: &Setting<'_>, mut mesh: Mesh, properties: &Properties<'_>) 
             _ => mesh.compute_normals(),
         }
     }
-    if properties.boolean("flip_normals")?.unwrap_or(false) {
+    if properties.boolean("flip_normals")? {
         mesh.flip_normals();
         hash = None;
     }
@@ -302,15 +302,8 @@ fn place_in(setting: &Setting<'_>, mut mesh: Mesh, properties: &Properties<'_>) 
 
 /// The file that a mesh plugin names, to be read with that plugin's own `options`.
 pub(super) fn file(properties: &Properties<'_>, options: ReadOptions) -> Result<MeshFile> {
-    let Some(path) = properties.file("filename")? else {
-        return Err(properties
-            .error(
-                "filename",
-                format!("{} needs a filename", properties.plugin()),
-            )
-            .help(r#"add <string name="filename" value="…"/>"#));
-    };
-    let flip_tex_coords = properties.boolean("flip_tex_coords")?;
+    let path = properties.file("filename")?;
+    let flip_tex_coords = properties.given("flip_tex_coords")?;
     let options = ReadOptions {
         flip_tex_coords,
         ..options

@@ -25,6 +25,9 @@ use std::path::Path;
 
 use glam::{DAffine3, DMat3, DMat4, DVec3, Vec2, Vec3};
 
+use crate::description::declared::{
+    Plugin, Plugins, Row, boolean, file, float, nested, number, transform,
+};
 use crate::description::{Kind, Properties};
 use crate::error::{Problem, Result};
 use crate::family;
@@ -238,30 +241,102 @@ enum Build {
     Read(fn(&Properties<'_>) -> Result<ReadOptions>),
 }
 
-/// The shape plugins.
-const PLUGINS: &[(&str, Build)] = &[
-    ("cone", Build::Made(cone::build)),
-    ("cube", Build::Made(cube::build)),
-    ("cylinder", Build::Made(cylinder::build)),
-    ("disk", Build::Made(disk::build)),
-    ("gltf", Build::Read(gltf::options)),
-    ("obj", Build::Read(obj::options)),
-    ("plane", Build::Made(plane::build)),
-    ("ply", Build::Read(ply::options)),
-    ("polygon", Build::Made(polygon::build)),
-    ("rectangle", Build::Made(rectangle::build)),
-    ("serialized", Build::Read(serialized::options)),
-    ("sphere", Build::Made(sphere::build)),
-    ("stl", Build::Read(stl::options)),
-    ("triangle", Build::Made(triangle::build)),
+/// The shape plugins that are shapes by themselves.
+const SINGLE: &[(&str, &Plugin, Build)] = &[
+    ("cone", &cone::PLUGIN, Build::Made(cone::build)),
+    ("cube", &cube::PLUGIN, Build::Made(cube::build)),
+    ("cylinder", &cylinder::PLUGIN, Build::Made(cylinder::build)),
+    ("disk", &disk::PLUGIN, Build::Made(disk::build)),
+    ("gltf", &gltf::PLUGIN, Build::Read(gltf::options)),
+    ("obj", &obj::PLUGIN, Build::Read(obj::options)),
+    ("plane", &plane::PLUGIN, Build::Made(plane::build)),
+    ("ply", &ply::PLUGIN, Build::Read(ply::options)),
+    ("polygon", &polygon::PLUGIN, Build::Made(polygon::build)),
+    (
+        "rectangle",
+        &rectangle::PLUGIN,
+        Build::Made(rectangle::build),
+    ),
+    (
+        "serialized",
+        &serialized::PLUGIN,
+        Build::Read(serialized::options),
+    ),
+    ("sphere", &sphere::PLUGIN, Build::Made(sphere::build)),
+    ("stl", &stl::PLUGIN, Build::Read(stl::options)),
+    ("triangle", &triangle::PLUGIN, Build::Made(triangle::build)),
 ];
 
-/// The plugin that `properties` name, if there is one.
-fn plugin(properties: &Properties<'_>) -> Option<&'static Build> {
-    let mut plugins = PLUGINS.iter();
-    let named = plugins.find(|(name, _)| *name == properties.plugin());
-    named.map(|(_, build)| build)
+/// How the plugin that `properties` name comes to its shape, if it is one by itself.
+fn single(properties: &Properties<'_>) -> Option<&'static Build> {
+    let mut plugins = SINGLE.iter();
+    let named = plugins.find(|(name, ..)| *name == properties.plugin());
+    named.map(|(.., build)| build)
 }
+
+/// From a shape's space to that in which it stands.
+const TO_WORLD: Row = transform("to_world", "from the shape's space to the world");
+/// Which side is the front.
+const FLIP_NORMALS: Row = boolean("flip_normals", false, "whether the other side is the front");
+const BSDF: Row = nested(Kind::Bsdf, "how it scatters light; diffuse without one");
+
+/// What every shape reads.
+const COMMON: &[Row] = &[
+    TO_WORLD,
+    BSDF,
+    nested(Kind::Emitter, "area, where it gives light"),
+    nested(Kind::Medium, "what it encloses: ignored, with a warning").without_effect(),
+    float(
+        "silhouette_sampling_weight",
+        1.0,
+        "for differentiable rendering",
+    )
+    .without_effect(),
+    number(
+        "displacement",
+        0.0,
+        "how far the surface moves along its normal; scene units",
+    )
+    .absent("none")
+    .own(),
+    float(
+        "displacement_scale",
+        1.0,
+        "what displacement is multiplied by",
+    )
+    .own(),
+    float(
+        "displacement_offset",
+        0.0,
+        "what is added to that; scene units",
+    )
+    .own(),
+    float(
+        "displacement_edge",
+        0.0,
+        "longest edge of the triangles; scene units",
+    )
+    .positive()
+    .absent("1/256 of the box's diagonal")
+    .own(),
+];
+
+/// What every mesh reads.
+const MESH: &[Row] = &[
+    FLIP_NORMALS,
+    boolean(
+        "face_normals",
+        false,
+        "whether triangles are flat, whatever normals there are",
+    ),
+];
+
+/// What every mesh from a file reads.
+const FILE: &[Row] = &[
+    file("filename", "the mesh"),
+    boolean("flip_tex_coords", false, "whether v runs from the top")
+        .absent("true for obj, else false"),
+];
 
 /// Shapes made of shapes, which the scene puts together: several in a space of their own, and those once
 /// more in the world.
@@ -271,15 +346,53 @@ pub const INSTANCE: &str = "instance";
 /// A node of a scene graph: shapes that share its transform and its material.
 pub const NODE: &str = "group";
 
-/// The names of the plugins, as scene files write them.
-pub fn names() -> Vec<&'static str> {
-    let single = PLUGINS.iter().map(|(name, _)| *name);
-    single.chain([GROUP, INSTANCE, NODE]).collect()
+const COMPOUND: Plugins = &[
+    (
+        GROUP,
+        &Plugin {
+            about: "shapes in a space of their own, seen where instances of them stand",
+            properties: &[&[
+                nested(Kind::Shape, "the shapes"),
+                transform("to_world", "the shapes and the instances have their own")
+                    .without_effect(),
+            ]],
+        },
+    ),
+    (
+        INSTANCE,
+        &Plugin {
+            about: "a shapegroup once more",
+            properties: &[&[
+                transform("to_world", "from the group's space to the world"),
+                nested(Kind::Shape, "the shapegroup, by reference"),
+            ]],
+        },
+    ),
+    (
+        NODE,
+        &Plugin {
+            about: "a node of a scene graph: shapes that share a transform and a material",
+            properties: &[&[
+                TO_WORLD,
+                nested(Kind::Shape, "shapes, instances and groups"),
+                nested(Kind::Bsdf, "of those shapes that have none of their own"),
+            ]],
+        },
+    ),
+];
+
+/// The plugins' names, as scene files write them, and what they declare.
+pub fn plugins() -> impl Iterator<Item = (&'static str, &'static Plugin)> + Clone {
+    let single = SINGLE.iter().map(|(name, plugin, _)| (*name, *plugin));
+    single.chain(COMPOUND.iter().copied())
 }
 
-/// Refuses a shape plugin that is Étendue's own where the scene is read strictly.
-pub(crate) fn check_strict(properties: &Properties<'_>) -> Result<()> {
-    family::check_strict(properties, "shape", &names())
+/// The properties as the shape sees them that they name.
+///
+/// # Errors
+/// Where there is no such shape, or it is Étendue's own and the scene is read strictly.
+pub(crate) fn declared<'a>(properties: &Properties<'a>) -> Result<Properties<'a>> {
+    family::declared(properties, plugins())
 }
 
 /// Builds the shape that `properties` names.
@@ -298,9 +411,8 @@ pub struct Setting<'a> {
 
 /// Builds the shape that `properties` names, as it stands in its setting.
 pub fn build_within(setting: &Setting<'_>, properties: &Properties<'_>) -> Result<Shape> {
-    debug_assert_eq!(properties.kind(), Kind::Shape);
-    check_strict(properties)?;
-    match plugin(properties) {
+    let properties = &declared(properties)?;
+    match single(properties) {
         Some(Build::Made(build)) => build(properties, &setting.outer),
         Some(Build::Read(options)) => {
             let file = mesh::file(properties, options(properties)?)?;
@@ -308,18 +420,17 @@ pub fn build_within(setting: &Setting<'_>, properties: &Properties<'_>) -> Resul
             let loaded = loaded.map_err(|e| e.named_at(properties.location()))?;
             mesh::place_file(loaded, properties, setting)
         }
-        None => Err(family::unknown(
-            properties,
-            "shape",
-            properties.plugin(),
-            &names(),
-        )),
+        None => {
+            let message = format!("a {} is put together by the scene", properties.plugin());
+            Err(properties.error("", message))
+        }
     }
 }
 
 /// The mesh file from which the shape is built; `None` where it needs none, or does not say it right.
 pub fn mesh_file(properties: &Properties<'_>) -> Option<MeshFile> {
-    match plugin(properties)? {
+    let properties = &declared(properties).ok()?;
+    match single(properties)? {
         Build::Made(_) => None,
         Build::Read(options) => mesh::file(properties, options(properties).ok()?).ok(),
     }
@@ -331,14 +442,12 @@ pub fn build_from(
     setting: &Setting<'_>,
     properties: &Properties<'_>,
 ) -> Result<Shape> {
-    check_strict(properties)?;
-    mesh::place_file(loaded, properties, setting)
+    mesh::place_file(loaded, &declared(properties)?, setting)
 }
 
 /// The property `to_world`, the identity by default, and then `outer`.
 fn to_world(properties: &Properties<'_>, outer: &DMat4) -> Result<DMat4> {
-    let own = properties.transform("to_world")?;
-    Ok(own.map_or(*outer, |own| *outer * own))
+    Ok(*outer * properties.transform("to_world")?)
 }
 
 /// A bound, for each axis, on the error of a world position that was computed in double precision from the

@@ -6,6 +6,7 @@ use glam::{DAffine3, DMat4, DVec3, Vec2, Vec3};
 
 use super::{Bounds, Geometry, Shape, Surface, SurfaceSample, rounding, to_world};
 use crate::description::Properties;
+use crate::description::declared::Plugin;
 use crate::error::Result;
 use crate::interaction::{Hit, Interaction, Ray};
 use crate::math::Frame;
@@ -19,10 +20,15 @@ pub struct Plane {
     normal: Vec3,
 }
 
+pub(super) const PLUGIN: Plugin = Plugin {
+    about: "the rectangle without its edges",
+    properties: &[super::COMMON, &[super::FLIP_NORMALS]],
+};
+
 pub(super) fn build(properties: &Properties<'_>, outer: &DMat4) -> Result<Shape> {
     let to_world = DAffine3::from_mat4(to_world(properties, outer)?);
     let to_local = to_world.inverse();
-    let flip = properties.boolean("flip_normals")?.unwrap_or(false);
+    let flip = properties.boolean("flip_normals")?;
     // By the inverse transpose, whose rows are the columns here.
     let normal = to_local.matrix3.row(2).normalize_or_zero() * if flip { -1.0 } else { 1.0 };
     if !(to_local.is_finite() && normal != DVec3::ZERO) {

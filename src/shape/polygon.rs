@@ -7,6 +7,7 @@ use earcut::Earcut;
 use glam::{DMat4, DVec2, DVec3, Vec2};
 
 use super::{Shape, mesh::place};
+use crate::description::declared::{Plugin, string, vector};
 use crate::description::{Properties, Value};
 use crate::error::{Error, Result};
 use crate::mesh::Mesh;
@@ -15,6 +16,23 @@ use crate::mesh::Mesh;
 const MAX_CORNERS: usize = 4096;
 /// How far from the common plane a corner may lie, as a part of the polygon's size.
 const FLATNESS: f64 = 1e-4;
+
+pub(super) const PLUGIN: Plugin = Plugin {
+    about: "a flat polygon, which may be concave",
+    properties: &[
+        super::COMMON,
+        super::MESH,
+        &[
+            vector(
+                "p#",
+                [0.0; 3],
+                "the corners p0, p1, …, counter-clockwise seen from the front",
+            )
+            .required(),
+            string("uv", "", "as many pairs as corners").absent("from its first edge"),
+        ],
+    ],
+};
 
 pub(super) fn build(properties: &Properties<'_>, outer: &DMat4) -> Result<Shape> {
     let corners = corners(properties)?;
@@ -60,7 +78,6 @@ fn corners(properties: &Properties<'_>) -> Result<Vec<DVec3>> {
             continue;
         };
         if property.name == format!("p{number}") {
-            property.mark_read();
             numbered.push((number, *point));
         }
     }
@@ -82,7 +99,7 @@ fn corners(properties: &Properties<'_>) -> Result<Vec<DVec3>> {
 
 /// The property `uv`: as many pairs as there are corners.
 pub(super) fn uvs(properties: &Properties<'_>, corners: usize) -> Result<Option<Vec<Vec2>>> {
-    let Some(text) = properties.string("uv")? else {
+    let Some(text) = properties.given::<&str>("uv")? else {
         return Ok(None);
     };
     let words = text.split(|c: char| c == ',' || c.is_whitespace());

@@ -2,17 +2,23 @@
 //! `face_normals`, `flip_normals` and `flip_tex_coords`.
 
 use crate::description::Properties;
+use crate::description::declared::{Plugin, integer};
 use crate::error::Result;
 use crate::mesh::ReadOptions;
 
+pub(super) const PLUGIN: Plugin = Plugin {
+    about: "a mesh in Mitsuba's binary format",
+    properties: &[
+        super::COMMON,
+        super::MESH,
+        super::FILE,
+        &[integer("shape_index", 0, "which of the file's meshes").at_least(0.0)],
+    ],
+};
+
 pub(super) fn options(properties: &Properties<'_>) -> Result<ReadOptions> {
-    let index = properties.integer("shape_index")?.unwrap_or(0);
-    let Ok(shape_index) = usize::try_from(index) else {
-        let message = format!("shape_index counts from 0, and {index} does not");
-        return Err(properties.error("shape_index", message));
-    };
     Ok(ReadOptions {
-        shape_index,
+        shape_index: properties.integer("shape_index")? as usize,
         ..ReadOptions::default()
     })
 }

@@ -5,12 +5,13 @@
 
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
-use glam::{DMat4, DVec3, Mat3, Vec2, Vec3};
+use glam::{DMat4, Mat3, Vec2, Vec3};
 
 use super::{
     Bounds, Chart, Geometry, Shape, Surface, SurfaceSample, area_to_solid_angle, to_world,
 };
 use crate::description::Properties;
+use crate::description::declared::{Plugin, float, vector};
 use crate::error::Result;
 use crate::interaction::{Hit, Interaction, Ray};
 use crate::math::{Frame, offset, warp};
@@ -26,10 +27,22 @@ pub struct Sphere {
     flip_normals: bool,
 }
 
+pub(super) const PLUGIN: Plugin = Plugin {
+    about: "a sphere",
+    properties: &[
+        super::COMMON,
+        &[
+            vector("center", [0.0; 3], "its centre"),
+            float("radius", 1.0, "scene units").positive(),
+            super::FLIP_NORMALS,
+        ],
+    ],
+};
+
 pub(super) fn build(properties: &Properties<'_>, outer: &DMat4) -> Result<Shape> {
     let to_world = to_world(properties, outer)?;
-    let center = properties.vector("center")?.unwrap_or(DVec3::ZERO);
-    let radius = properties.float("radius")?.unwrap_or(1.0);
+    let center = properties.vector("center")?;
+    let radius = properties.float("radius")?;
     let axes = [to_world.x_axis, to_world.y_axis, to_world.z_axis].map(|a| a.truncate());
     let scale = axes[0].length();
     let uneven = axes.iter().any(|a| (a.length() / scale - 1.0).abs() > 1e-4)
@@ -49,7 +62,7 @@ pub(super) fn build(properties: &Properties<'_>, outer: &DMat4) -> Result<Shape>
     let [x, y, z] = axes.map(|a| (a / scale).as_vec3());
     // As in Mitsuba, a mirroring transform turns a sphere's normals over, and no other shape's here.
     let mirrored = axes[0].cross(axes[1]).dot(axes[2]) < 0.0;
-    let flip_normals = properties.boolean("flip_normals")?.unwrap_or(false) != mirrored;
+    let flip_normals = properties.boolean("flip_normals")? != mirrored;
     let sphere = Sphere {
         center,
         radius,

@@ -6,14 +6,34 @@ use glam::{DMat4, DVec3, Vec2, Vec3};
 
 use super::{Shape, mesh::place, polygon};
 use crate::description::Properties;
+use crate::description::declared::{Plugin, string, vector};
 use crate::error::Result;
 use crate::mesh::Mesh;
 
+pub(super) const PLUGIN: Plugin = Plugin {
+    about: "a triangle",
+    properties: &[
+        super::COMMON,
+        super::MESH,
+        &[
+            vector("p0", [0.0; 3], "first corner").required(),
+            vector(
+                "p1",
+                [0.0; 3],
+                "second corner, counter-clockwise seen from the front",
+            )
+            .required(),
+            vector("p2", [0.0; 3], "third corner").required(),
+            vector("n0", [0.0; 3], "normal at the first corner").absent("the triangle's"),
+            vector("n1", [0.0; 3], "normal at the second corner").absent("the triangle's"),
+            vector("n2", [0.0; 3], "normal at the third corner").absent("the triangle's"),
+            string("uv", "", "three pairs").absent("0,0 1,0 0,1"),
+        ],
+    ],
+};
+
 pub(super) fn build(properties: &Properties<'_>, outer: &DMat4) -> Result<Shape> {
-    let corner = |name| match properties.vector(name)? {
-        Some(point) => Ok(point),
-        None => Err(properties.error("", format!("a triangle needs a point {name:?}"))),
-    };
+    let corner = |name| properties.vector(name);
     let [a, b, c] = [corner("p0")?, corner("p1")?, corner("p2")?];
     if (b - a).cross(c - a) == DVec3::ZERO {
         return Err(properties.error("", "the corners of a triangle cannot lie on a line"));
@@ -36,7 +56,7 @@ pub(super) fn build(properties: &Properties<'_>, outer: &DMat4) -> Result<Shape>
 fn normals(properties: &Properties<'_>) -> Result<Vec<Vec3>> {
     let mut normals = Vec::new();
     for name in ["n0", "n1", "n2"] {
-        let Some(normal) = properties.vector(name)? else {
+        let Some(normal) = properties.given::<DVec3>(name)? else {
             continue;
         };
         let Some(normal) = normal.try_normalize() else {

@@ -9,6 +9,7 @@ use glam::{Mat3, Vec2};
 use super::{Palette, Pattern, Picture, to_uv, transformed};
 use crate::color::{ColorModel, Role, Spectral};
 use crate::description::Properties;
+use crate::description::declared::{Plugin, boolean, choice, file, string};
 use crate::error::Result;
 use crate::interaction::Interaction;
 
@@ -62,31 +63,40 @@ struct Cell<S> {
 }
 
 impl<C: ColorModel> Bitmap<C> {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "an image",
+        properties: &[&[
+            file("filename", "the image"),
+            choice(
+                "filter_type",
+                &["bilinear", "nearest"],
+                "how texels are looked up",
+            ),
+            choice(
+                "wrap_mode",
+                &["repeat", "mirror", "clamp"],
+                "what lies beyond the edge",
+            ),
+            boolean(
+                "raw",
+                false,
+                "numbers as they are in the file, and not sRGB codes of colours",
+            ),
+            super::TO_UV,
+            string("format", "variant", "how Mitsuba stores texels").without_effect(),
+            boolean("accel", true, "whether Mitsuba lets a GPU look texels up").without_effect(),
+        ]],
+    };
+
     pub(super) fn build(properties: &Properties<'_>, palette: &Palette<C>) -> Result<Self> {
-        let nearest = match properties.string("filter_type")?.unwrap_or("bilinear") {
-            "bilinear" => false,
-            "nearest" => true,
-            other => {
-                let error =
-                    properties.error("filter_type", format!("unknown filter type \"{other}\""));
-                return Err(error.help("there are bilinear and nearest"));
-            }
-        };
-        let wrap = match properties.string("wrap_mode")?.unwrap_or("repeat") {
-            "repeat" => Wrap::Repeat,
+        let nearest = properties.choice("filter_type")? == "nearest";
+        let wrap = match properties.choice("wrap_mode")? {
             "mirror" => Wrap::Mirror,
             "clamp" => Wrap::Clamp,
-            other => {
-                let error = properties.error("wrap_mode", format!("unknown wrap mode \"{other}\""));
-                return Err(error.help("there are repeat, mirror and clamp"));
-            }
+            _ => Wrap::Repeat,
         };
-        let raw = properties.boolean("raw")?.unwrap_or(false);
-        // How Mitsuba stores texels; here that follows from what they are for.
-        properties.ignore("format");
-        let Some(path) = properties.file("filename")? else {
-            return Err(properties.error("filename", "a bitmap needs a filename"));
-        };
+        let raw = properties.boolean("raw")?;
+        let path = properties.file("filename")?;
         let to_uv = to_uv(properties)?;
         let key = (path, palette.role, raw);
         let lock = || {

@@ -4,6 +4,7 @@
 use super::{Palette, Pattern};
 use crate::color::{ColorModel, cie};
 use crate::description::Properties;
+use crate::description::declared::{Plugin, float};
 use crate::error::Result;
 use crate::interaction::Interaction;
 
@@ -14,25 +15,26 @@ pub struct Blackbody<C: ColorModel> {
 }
 
 impl<C: ColorModel> Blackbody<C> {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "what a black body radiates; W·m⁻²·sr⁻¹·nm⁻¹",
+        properties: &[&[
+            float("temperature", 0.0, "in kelvin")
+                .at_least(0.0)
+                .required(),
+            float(
+                "wavelength_min",
+                cie::FIRST as f64,
+                "where it begins, in nm",
+            ),
+            float("wavelength_max", cie::LAST as f64, "where it ends, in nm"),
+        ]],
+    };
+
     pub(super) fn build(properties: &Properties<'_>, palette: &Palette<C>) -> Result<Self> {
-        let temperature = match properties.float("temperature")? {
-            Some(kelvin) if kelvin >= 0.0 => kelvin,
-            Some(_) => {
-                return Err(
-                    properties.error("temperature", "a temperature in kelvin is not negative")
-                );
-            }
-            None => return Err(properties.error("temperature", "a blackbody needs a temperature")),
-        };
+        let temperature = properties.float("temperature")?;
         let (least, most) = (f64::from(cie::FIRST), f64::from(cie::LAST));
-        let first = properties
-            .float("wavelength_min")?
-            .unwrap_or(least)
-            .max(least);
-        let last = properties
-            .float("wavelength_max")?
-            .unwrap_or(most)
-            .min(most);
+        let first = properties.float("wavelength_min")?.max(least);
+        let last = properties.float("wavelength_max")?.min(most);
         if last <= first {
             let message = format!("no wavelength from {first} to {last} nm is visible");
             return Err(properties.error("wavelength_max", message));

@@ -7,8 +7,9 @@ use std::any::TypeId;
 use glam::Mat3;
 
 use super::{Palette, Pattern, Texture, to_uv, transformed};
-use crate::color::{Color, ColorModel, Mono};
+use crate::color::{ColorModel, Mono};
 use crate::description::Properties;
+use crate::description::declared::{Plugin, texture};
 use crate::error::Result;
 use crate::interaction::Interaction;
 
@@ -21,9 +22,22 @@ pub struct Checkerboard<C: ColorModel> {
 }
 
 impl<C: ColorModel> Checkerboard<C> {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "squares",
+        properties: &[&[
+            texture(
+                "color0",
+                0.4,
+                "in the square at the origin and on its diagonal",
+            ),
+            texture("color1", 0.2, "in the others"),
+            super::TO_UV,
+        ]],
+    };
+
     pub(super) fn build(properties: &Properties<'_>, palette: &Palette<C>) -> Result<Self> {
-        let color0 = palette.texture(properties, "color0", palette.role, Color::Grey(0.4))?;
-        let color1 = palette.texture(properties, "color1", palette.role, Color::Grey(0.2))?;
+        let color0 = palette.texture(properties, "color0", palette.role)?;
+        let color1 = palette.texture(properties, "color1", palette.role)?;
         let numbers = TypeId::of::<C>() == TypeId::of::<Mono>();
         Ok(Self {
             colors: Box::new(if numbers {
@@ -58,8 +72,8 @@ mod tests {
         let path = std::path::Path::new("test.xml");
         let scene = Description::parse(text, path, &Options::default()).unwrap();
         let texture = scene.root().children(Kind::Texture)[0];
-        let numbers = Checkerboard::build(&texture, &Palette::new(Mono)).unwrap();
-        let colors = Checkerboard::build(&texture, &Palette::new(Rgb)).unwrap();
+        let numbers = Texture::build(&texture, &Palette::new(Mono)).unwrap();
+        let colors = Texture::build(&texture, &Palette::new(Rgb)).unwrap();
         for (u, v, number, color) in [
             (0.01, 0.1, 0.2, 0.4),
             (0.03, 0.1, 0.4, 0.2),

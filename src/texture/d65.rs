@@ -3,6 +3,7 @@
 
 use super::{Palette, Pattern, Texture, srgb};
 use crate::color::{Color, ColorModel, Role, Spectral};
+use crate::description::declared::{Plugin, float, nested};
 use crate::description::{Kind, Properties};
 use crate::error::Result;
 use crate::interaction::Interaction;
@@ -15,8 +16,24 @@ pub struct D65<C: ColorModel> {
 }
 
 impl<C: ColorModel> D65<C> {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "daylight, the white of RGB",
+        properties: &[&[
+            float("scale", 1.0, "what it is multiplied by"),
+            srgb::COLOR.absent("white"),
+            nested(
+                Kind::Texture,
+                "what it is multiplied by, in place of a color",
+            ),
+            nested(
+                Kind::Spectrum,
+                "what it is multiplied by, in place of a color",
+            ),
+        ]],
+    };
+
     pub(super) fn build(properties: &Properties<'_>, palette: &Palette<C>) -> Result<Self> {
-        let scale = properties.float("scale")?.unwrap_or(1.0);
+        let scale = properties.float("scale")?;
         palette.refuse_negative_light(properties, "scale", &[scale])?;
         let rgb = srgb::rgb(properties)?;
         palette.refuse_negative_light(properties, "color", rgb.as_slice().as_flattened())?;

@@ -5,6 +5,7 @@ use super::regular::numbers;
 use super::{Palette, Pattern};
 use crate::color::ColorModel;
 use crate::description::Properties;
+use crate::description::declared::{Plugin, string};
 use crate::error::Result;
 use crate::interaction::Interaction;
 
@@ -15,6 +16,14 @@ pub struct Irregular<C: ColorModel> {
 }
 
 impl<C: ColorModel> Irregular<C> {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "a spectrum by values at wavelengths",
+        properties: &[&[
+            string("wavelengths", "", "increasing, in nm").required(),
+            string("values", "", "one for each; linear between, 0 outside").required(),
+        ]],
+    };
+
     pub(super) fn build(properties: &Properties<'_>, palette: &Palette<C>) -> Result<Self> {
         let wavelengths = numbers(properties, "wavelengths")?;
         let values = numbers(properties, "values")?;

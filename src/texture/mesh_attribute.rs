@@ -4,6 +4,7 @@
 use super::{Palette, Pattern};
 use crate::color::{ColorModel, Role};
 use crate::description::Properties;
+use crate::description::declared::{Plugin, float, string};
 use crate::error::Result;
 use crate::interaction::Interaction;
 use crate::mesh::{Attribute, Mesh, Per};
@@ -18,10 +19,16 @@ pub struct MeshAttribute<C: ColorModel> {
 }
 
 impl<C: ColorModel> MeshAttribute<C> {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "a value that the mesh has at its vertices or faces",
+        properties: &[&[
+            string("name", "", "vertex_… or face_…, as the mesh names it").required(),
+            float("scale", 1.0, "what it is multiplied by"),
+        ]],
+    };
+
     pub(super) fn build(properties: &Properties<'_>, palette: &Palette<C>) -> Result<Self> {
-        let Some(name) = properties.string("name")? else {
-            return Err(properties.error("name", "a mesh_attribute needs the attribute's name"));
-        };
+        let name = properties.string("name")?;
         if !name.starts_with("vertex_") && !name.starts_with("face_") {
             let message =
                 format!("an attribute's name starts with vertex_ or face_, and {name:?} does not");
@@ -29,7 +36,7 @@ impl<C: ColorModel> MeshAttribute<C> {
         }
         Ok(Self {
             name: name.to_owned(),
-            scale: properties.float("scale")?.unwrap_or(1.0) as f32,
+            scale: properties.float("scale")? as f32,
             color: palette.color.clone(),
             role: palette.role,
         })

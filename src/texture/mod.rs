@@ -21,6 +21,7 @@ use std::sync::{Arc, Mutex};
 use glam::{Mat3, Vec2, Vec3};
 
 use crate::color::{Color, ColorModel, Mono, Rgb, Role, Spectral};
+use crate::description::declared::{Preset, Row, transform};
 use crate::description::{Kind, Properties, Property, Spectrum, Value};
 use crate::error::{Error, Problem, Result};
 use crate::family::family;
@@ -54,7 +55,7 @@ pub trait Pattern<C: ColorModel>: std::fmt::Debug + Send + Sync {
 family! {
     /// Every texture there is.
     #[derive(Clone, Debug)]
-    pub enum Texture<C>: Pattern, kind "texture", context Palette<C> {
+    pub enum Texture<C>: Pattern, context Palette<C> {
         "bitmap" => Bitmap(bitmap::Bitmap<C>),
         "blackbody" => Blackbody(blackbody::Blackbody<C>),
         "checkerboard" => Checkerboard(checkerboard::Checkerboard<C>),
@@ -107,15 +108,14 @@ impl<C: ColorModel> Palette<C> {
         }
     }
 
-    /// The colour called `name`, or `default`; what varies over a surface is refused.
+    /// The colour called `name`, or the declared grey; what varies over a surface is refused.
     pub fn color(
         &self,
         properties: &Properties<'_>,
         name: &'static str,
         role: Role,
-        default: Color,
     ) -> Result<C::Stored> {
-        let texture = self.texture(properties, name, role, default)?;
+        let texture = self.texture(properties, name, role)?;
         let refused = || {
             let error = properties.error(name, format!("{name:?} must be the same everywhere"));
             error.help("give a color or a spectrum instead of this texture")
@@ -123,16 +123,18 @@ impl<C: ColorModel> Palette<C> {
         texture.constant().cloned().ok_or_else(refused)
     }
 
-    /// The colour or texture called `name`, or `default` everywhere.
+    /// The colour or texture called `name`, or the declared grey everywhere.
     pub fn texture(
         &self,
         properties: &Properties<'_>,
         name: &'static str,
         role: Role,
-        default: Color,
     ) -> Result<Texture<C>> {
         let color = match properties.value(name) {
-            None => default,
+            None => match properties.preset(name) {
+                Preset::Float(value) => Color::Grey(value),
+                _ => return Err(properties.missing(name)),
+            },
             Some(Property {
                 value: Value::Object(_),
                 ..
@@ -226,14 +228,9 @@ impl<C: ColorModel> Palette<C> {
 }
 
 impl Palette<Mono> {
-    /// The number or texture called `name`, or `default` everywhere.
-    pub fn number(
-        &self,
-        properties: &Properties<'_>,
-        name: &'static str,
-        default: f64,
-    ) -> Result<Texture<Mono>> {
-        self.texture(properties, name, Role::Quantity, Color::Grey(default))
+    /// The number or texture called `name`, or the declared number everywhere.
+    pub fn number(&self, properties: &Properties<'_>, name: &'static str) -> Result<Texture<Mono>> {
+        self.texture(properties, name, Role::Quantity)
     }
 }
 
@@ -296,11 +293,12 @@ fn color(property: &Property) -> Result<Color> {
     })
 }
 
+/// What is done to texture coordinates.
+const TO_UV: Row = transform("to_uv", "of texture coordinates, before they are looked up");
+
 /// The property `to_uv`: what is done to texture coordinates before they are looked up.
 fn to_uv(properties: &Properties<'_>) -> Result<Mat3> {
-    let Some(m) = properties.transform("to_uv")? else {
-        return Ok(Mat3::IDENTITY);
-    };
+    let m = properties.transform("to_uv")?;
     let column = |c: glam::DVec4| Vec3::new(c.x as f32, c.y as f32, 0.0);
     Ok(Mat3::from_cols(
         column(m.x_axis),

@@ -3,6 +3,7 @@
 
 use super::{Palette, Pattern};
 use crate::color::{Color, ColorModel, Role};
+use crate::description::declared::{Plugin, float};
 use crate::description::{Properties, Property, Value};
 use crate::error::Result;
 use crate::interaction::Interaction;
@@ -14,14 +15,18 @@ pub struct RawConstant<C: ColorModel> {
 }
 
 impl<C: ColorModel> RawConstant<C> {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "three numbers, or one, as they are",
+        properties: &[&[float("value", 0.0, "a number, or a vector").required()]],
+    };
+
     pub(super) fn build(properties: &Properties<'_>, palette: &Palette<C>) -> Result<Self> {
         let value = match properties.value("value") {
-            None => return Err(properties.error("value", "a rawconstant needs a value")),
             Some(Property {
                 value: Value::Vector(v),
                 ..
             }) => Color::Rgb(v.to_array()),
-            Some(_) => Color::Grey(properties.float("value")?.expect("the property is there")),
+            _ => Color::Grey(properties.float("value")?),
         };
         if let Color::Grey(value) = value {
             palette.refuse_negative_light(properties, "value", &[value])?;

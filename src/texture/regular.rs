@@ -4,6 +4,7 @@
 use super::{Palette, Pattern};
 use crate::color::ColorModel;
 use crate::description::Properties;
+use crate::description::declared::{Plugin, float, string};
 use crate::error::Result;
 use crate::interaction::Interaction;
 
@@ -14,13 +15,22 @@ pub struct Regular<C: ColorModel> {
 }
 
 impl<C: ColorModel> Regular<C> {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "a spectrum by values at even steps",
+        properties: &[&[
+            float("wavelength_min", 0.0, "of the first value, in nm")
+                .positive()
+                .required(),
+            float("wavelength_max", 0.0, "of the last value, in nm")
+                .positive()
+                .required(),
+            string("values", "", "two or more; linear between, 0 outside").required(),
+        ]],
+    };
+
     pub(super) fn build(properties: &Properties<'_>, palette: &Palette<C>) -> Result<Self> {
-        let end = |name| match properties.float(name)? {
-            Some(nanometres) if nanometres > 0.0 => Ok(nanometres),
-            Some(_) => Err(properties.error(name, "a wavelength is positive")),
-            None => Err(properties.error(name, format!("a regular spectrum needs {name:?}"))),
-        };
-        let (first, last) = (end("wavelength_min")?, end("wavelength_max")?);
+        let first = properties.float("wavelength_min")?;
+        let last = properties.float("wavelength_max")?;
         if last <= first {
             let message = format!("wavelength_max {last} is not above wavelength_min {first}");
             return Err(properties.error("wavelength_max", message));
@@ -36,10 +46,7 @@ impl<C: ColorModel> Regular<C> {
 
 /// A list of at least two numbers that are not negative, parted by commas or spaces.
 pub(super) fn numbers(properties: &Properties<'_>, name: &'static str) -> Result<Vec<f64>> {
-    let Some(text) = properties.string(name)? else {
-        let message = format!("a {} spectrum needs {name:?}", properties.plugin());
-        return Err(properties.error(name, message));
-    };
+    let text = properties.string(name)?;
     let words = text.split(|c: char| c == ',' || c.is_ascii_whitespace());
     let number = |word: &str| match word.parse::<f64>() {
         Ok(v) if v.is_finite() && v >= 0.0 => Ok(v),

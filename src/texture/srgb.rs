@@ -3,6 +3,7 @@
 
 use super::{Palette, Pattern};
 use crate::color::{Color, ColorModel, Role};
+use crate::description::declared::{Plugin, Row, boolean, color};
 use crate::description::{Properties, Value};
 use crate::error::Result;
 use crate::interaction::Interaction;
@@ -13,12 +14,23 @@ pub struct Srgb<C: ColorModel> {
     value: C::Stored,
 }
 
+/// A colour.
+pub(super) const COLOR: Row = color("color", 1.0, "linear BT.709, as <rgb>");
+
 impl<C: ColorModel> Srgb<C> {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "the same colour everywhere, without an illuminant",
+        properties: &[&[
+            COLOR.required(),
+            boolean("unbounded", false, "whether components may be above 1"),
+        ]],
+    };
+
     pub(super) fn build(properties: &Properties<'_>, palette: &Palette<C>) -> Result<Self> {
         let Some(rgb) = rgb(properties)? else {
-            return Err(properties.error("color", "an srgb spectrum needs a color"));
+            return Err(properties.missing("color"));
         };
-        let unbounded = properties.boolean("unbounded")?.unwrap_or(false);
+        let unbounded = properties.boolean("unbounded")?;
         if !unbounded && rgb.iter().any(|v| !(0.0..=1.0).contains(v)) {
             let error = properties.error("color", "the components of a color lie in [0, 1]");
             return Err(error.help("write <boolean name=\"unbounded\" value=\"true\"/>"));

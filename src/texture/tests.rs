@@ -137,7 +137,7 @@ fn a_colour_out_of_gamut_is_clamped_with_a_word() {
     );
     let light = scene.root().children(Kind::Emitter)[0];
     let palette = Palette::new(Rgb);
-    let color = palette.color(&light, "radiance", Role::Emission, Color::Grey(1.0));
+    let color = palette.color(&light, "radiance", Role::Emission);
     assert_close(color.unwrap(), [0.0, 0.38118, 0.0], "an LED");
     let warnings = palette.warnings.lock().unwrap().clone();
     assert_eq!(warnings.len(), 1);

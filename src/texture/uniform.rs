@@ -4,6 +4,7 @@
 use super::{Palette, Pattern};
 use crate::color::{Color, ColorModel, Role};
 use crate::description::Properties;
+use crate::description::declared::{Plugin, float};
 use crate::error::Result;
 use crate::interaction::Interaction;
 
@@ -14,6 +15,15 @@ pub struct Uniform<C: ColorModel> {
 }
 
 impl<C: ColorModel> Uniform<C> {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "the same value everywhere",
+        properties: &[&[
+            float("value", 1.0, "the value"),
+            float("wavelength_min", 360.0, "no bound, in Mitsuba either").without_effect(),
+            float("wavelength_max", 830.0, "no bound, in Mitsuba either").without_effect(),
+        ]],
+    };
+
     pub(super) fn new(value: C::Stored) -> Self {
         Self { value }
     }
@@ -24,11 +34,8 @@ impl<C: ColorModel> Uniform<C> {
     }
 
     pub(super) fn build(properties: &Properties<'_>, palette: &Palette<C>) -> Result<Self> {
-        let value = properties.float("value")?.unwrap_or(1.0);
+        let value = properties.float("value")?;
         palette.refuse_negative_light(properties, "value", &[value])?;
-        for name in ["wavelength_min", "wavelength_max"] {
-            properties.float(name)?;
-        }
         let value = palette.store(properties, "value", &Color::Flat(value), Role::Quantity)?;
         Ok(Self { value })
     }

@@ -8,8 +8,9 @@ use std::f32::consts::TAU;
 use glam::{Mat3, Vec2};
 
 use super::{Palette, Pattern, Texture, to_uv, transformed};
-use crate::color::{Color, ColorModel};
+use crate::color::ColorModel;
 use crate::description::Properties;
+use crate::description::declared::{Plugin, float, texture};
 use crate::error::Result;
 use crate::interaction::Interaction;
 
@@ -27,16 +28,22 @@ pub struct ZonePlate<C: ColorModel> {
 const MAX_RINGS: f64 = 1e6;
 
 impl<C: ColorModel> ZonePlate<C> {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "rings that grow finer outwards: what aliases first",
+        properties: &[&[
+            float("rings", 32.0, "from the middle to the nearest edge").between(0.0, MAX_RINGS),
+            texture("color0", 0.0, "in dark rings"),
+            texture("color1", 1.0, "in light ones"),
+            super::TO_UV,
+        ]],
+    };
+
     pub(super) fn build(properties: &Properties<'_>, palette: &Palette<C>) -> Result<Self> {
-        let rings = properties.float("rings")?.unwrap_or(32.0);
-        if !(0.0..=MAX_RINGS).contains(&rings) {
-            let message = format!("rings are a number from 0 to {MAX_RINGS}, and {rings} is not");
-            return Err(properties.error("rings", message));
-        }
+        let rings = properties.float("rings")?;
         Ok(Self {
             colors: Box::new([
-                palette.texture(properties, "color0", palette.role, Color::Grey(0.0))?,
-                palette.texture(properties, "color1", palette.role, Color::Grey(1.0))?,
+                palette.texture(properties, "color0", palette.role)?,
+                palette.texture(properties, "color1", palette.role)?,
             ]),
             rings: rings as f32,
             to_uv: to_uv(properties)?,
@@ -87,7 +94,7 @@ mod tests {
         let path = std::path::Path::new("test.xml");
         let scene = Description::parse(text, path, &Options::default()).unwrap();
         let texture = scene.root().children(Kind::Texture)[0];
-        let rings = ZonePlate::build(&texture, &Palette::new(Mono)).unwrap();
+        let rings = Texture::build(&texture, &Palette::new(Mono)).unwrap();
         let value = |u, v| rings.eval(&Interaction::at_uv(Vec2::new(u, v)), &())[0];
         assert_eq!(value(0.25, 0.5), 1.0);
         for ring in 1..=4 {

@@ -14,6 +14,7 @@ use glam::Vec2;
 use super::stratified::jittered;
 use super::{PointSet, Sampler, below_one, place, sample_count, units};
 use crate::description::Properties;
+use crate::description::declared::Plugin;
 use crate::error::Result;
 use crate::math::random;
 
@@ -33,6 +34,11 @@ pub struct Poisson {
 }
 
 impl Poisson {
+    pub(super) const PLUGIN: Plugin = Plugin {
+        about: "points that keep a distance",
+        properties: &[super::COMMON],
+    };
+
     pub(super) fn build(properties: &Properties<'_>, _context: &()) -> Result<Self> {
         Ok(Self::new(sample_count(properties)?))
     }

@@ -1,0 +1,307 @@
+//! Every plugin that a scene can name, with what it declares; and what a scene says that no plugin declares. This
+//! needs nothing to be built, so that it is told along with everything else that is wrong.
+
+use std::collections::BTreeSet;
+
+use crate::color::Rgb;
+use crate::description::declared::{
+    Plugin, Plugins, Row, Standing, boolean, float, integer, nested,
+};
+use crate::description::properties::STRICT;
+use crate::description::{Description, Kind, NodeId, Properties, Property, Value};
+use crate::error::{Error, Problem};
+use crate::family::is_mitsubas;
+use crate::filter::Filter;
+use crate::integrator::Integrator;
+use crate::light::Light;
+use crate::material::Material;
+use crate::sampler::Sampler;
+use crate::sensor::{FILMS, Sensor};
+use crate::shape;
+use crate::texture::Texture;
+
+/// A plugin that a scene can name.
+#[derive(Clone, Copy, Debug)]
+pub struct Listed {
+    /// Its tag.
+    pub kind: Kind,
+    /// Its `type`.
+    pub name: &'static str,
+    /// What it declares.
+    pub plugin: &'static Plugin,
+    /// Whether Mitsuba lacks it.
+    pub own: bool,
+}
+
+/// The scene itself. What it holds for others to refer to has no effect by itself.
+static SCENE: Plugin = Plugin {
+    about: "what is rendered",
+    properties: &[&[
+        nested(Kind::Integrator, "how light is found"),
+        nested(Kind::Sensor, "where it is seen from"),
+        nested(Kind::Shape, "what is there"),
+        nested(Kind::Emitter, "what gives light"),
+        nested(Kind::Bsdf, "to be referred to").without_effect(),
+        nested(Kind::Texture, "to be referred to").without_effect(),
+        nested(Kind::Spectrum, "to be referred to").without_effect(),
+        nested(Kind::Film, "to be referred to").without_effect(),
+        nested(Kind::Filter, "to be referred to").without_effect(),
+        nested(Kind::Sampler, "to be referred to").without_effect(),
+        nested(Kind::Medium, "to be referred to").without_effect(),
+        nested(Kind::Phase, "to be referred to").without_effect(),
+        nested(Kind::Volume, "to be referred to").without_effect(),
+        integer("kd_stop_prims", 3, TREE).without_effect(),
+        integer("kd_max_depth", 0, TREE).without_effect(),
+        integer("kd_min_max_bins", 128, TREE).without_effect(),
+        boolean("kd_clip", true, TREE).without_effect(),
+        boolean("kd_retract_bad_splits", true, TREE).without_effect(),
+        integer("kd_exact_primitive_threshold", 65536, TREE).without_effect(),
+        float("kd_intersection_cost", 20.0, TREE).without_effect(),
+        float("kd_traversal_cost", 15.0, TREE).without_effect(),
+        float("kd_empty_space_bonus", 0.9, TREE).without_effect(),
+        boolean("embree_use_robust_intersections", false, TREE).without_effect(),
+        boolean("allow_thread_reordering", true, TREE).without_effect(),
+        boolean("compact_acceleration_structures", true, TREE).without_effect(),
+    ]],
+};
+
+/// What Mitsuba's settings of its trees are about.
+const TREE: &str = "how Mitsuba finds what a ray meets";
+
+/// Every plugin, by kind and name; the scene itself comes first.
+pub fn plugins() -> Vec<Listed> {
+    let listed = |kind| {
+        move |(name, plugin): (&'static str, &'static Plugin)| Listed {
+            kind,
+            name,
+            plugin,
+            own: kind != Kind::Scene && !is_mitsubas(kind, name),
+        }
+    };
+    let families: [(Kind, Plugins); 8] = [
+        (Kind::Integrator, Integrator::<Rgb>::PLUGINS),
+        (Kind::Sensor, Sensor::PLUGINS),
+        (Kind::Film, FILMS),
+        (Kind::Filter, Filter::PLUGINS),
+        (Kind::Sampler, Sampler::PLUGINS),
+        (Kind::Bsdf, Material::<Rgb>::PLUGINS),
+        (Kind::Texture, Texture::<Rgb>::PLUGINS),
+        (Kind::Emitter, Light::<Rgb>::PLUGINS),
+    ];
+    let mut all = vec![listed(Kind::Scene)(("scene", &SCENE))];
+    for (kind, plugins) in families {
+        all.extend(plugins.iter().copied().map(listed(kind)));
+    }
+    all.extend(shape::plugins().map(listed(Kind::Shape)));
+    all
+}
+
+/// What is wrong with a scene's properties, and what is worth knowing of them.
+#[derive(Debug, Default)]
+pub(super) struct Findings {
+    /// Properties and nested plugins that nobody declares; in a strict scene, Étendue's own too.
+    pub(super) problems: Vec<Problem>,
+    /// The note that some plugins serve nobody.
+    pub(super) notes: Vec<Problem>,
+}
+
+/// Holds what a scene says against what its plugins declare. What serves nobody is not looked at, and a plugin
+/// that is not known is for its family to name.
+pub(super) fn examine(description: &Description) -> Findings {
+    let plugins = plugins();
+    let table = |node: &Properties<'_>| -> Option<&'static Plugin> {
+        let named = |kind| {
+            let mut known = plugins.iter();
+            known.find(|p| p.kind == kind && p.name == node.plugin())
+        };
+        // Either tag serves both.
+        let listed = match node.kind() {
+            Kind::Spectrum => named(Kind::Texture),
+            kind => named(kind),
+        };
+        Some(listed?.plugin)
+    };
+    let root = description.root();
+    let mut met = BTreeSet::from([root.node_id()]);
+    let mut waiting = vec![root.node_id()];
+    let mut findings = Findings::default();
+    let mut problems: Vec<(NodeId, Error)> = Vec::new();
+    while let Some(id) = waiting.pop() {
+        let node = description.node(id);
+        let Some(plugin) = table(&node) else {
+            continue;
+        };
+        for property in node.all() {
+            let child = match property.value {
+                Value::Object(child) => Some(description.node(child)),
+                _ => None,
+            };
+            let nested = child.and_then(|child| plugin.nested(child.kind()));
+            let Some(row) = plugin.row(&property.name).or(nested) else {
+                problems.push((id, undeclared(&node, plugin, property, child.as_ref())));
+                continue;
+            };
+            if row.standing == Standing::Own
+                && description.root().is_strict()
+                && is_mitsubas(node.kind(), node.plugin())
+            {
+                problems.push((id, of_our_own(&node, row, property)));
+            }
+            // What is at the top of the scene for others waits for them.
+            let serves = id != root.node_id() || row.standing == Standing::Common;
+            if let Some(child) = child.filter(|_| serves)
+                && met.insert(child.node_id())
+            {
+                waiting.push(child.node_id());
+            }
+        }
+    }
+    problems.sort_by_key(|(id, _)| *id);
+    for (_, error) in problems {
+        findings.problems.extend_from_slice(error.problems());
+    }
+    findings.notes.extend(idle(&root, &met));
+    findings
+}
+
+fn undeclared(
+    node: &Properties<'_>,
+    plugin: &'static Plugin,
+    property: &Property,
+    child: Option<&Properties<'_>>,
+) -> Error {
+    let (kind, name) = (node.kind(), property.name.as_str());
+    let error = match child {
+        Some(child) if name.is_empty() => Error::input(format!(
+            "{kind} {:?} has no use for the {} {:?}",
+            node.plugin(),
+            child.kind(),
+            child.plugin()
+        )),
+        _ => {
+            let names = plugin.rows().map(|row| row.name);
+            let message = format!("{kind} {:?} has no property {name:?}", node.plugin());
+            Error::input(message).suggest(name, names.filter(|name| !name.is_empty()))
+        }
+    };
+    error.at(&property.location)
+}
+
+fn of_our_own(node: &Properties<'_>, row: &Row, property: &Property) -> Error {
+    let message = format!(
+        "property {:?} of {} {:?} is Étendue's own",
+        row.name,
+        node.kind(),
+        node.plugin()
+    );
+    Error::input(message).at(&property.location).help(STRICT)
+}
+
+/// The note that there are plugins at the top of the scene that serve nobody.
+fn idle(root: &Properties<'_>, met: &BTreeSet<NodeId>) -> Option<Problem> {
+    let kinds = Kind::ALL.into_iter().flat_map(|kind| root.children(kind));
+    let mut idle: Vec<Properties<'_>> = kinds.filter(|c| !met.contains(&c.node_id())).collect();
+    idle.sort_by_key(Properties::node_id);
+    let first = idle.first()?;
+    let what = format!("{} {:?}", first.kind(), first.plugin());
+    let message = match idle.len() {
+        1 => format!("nothing refers to the {what}"),
+        n => format!(
+            "nothing refers to the {what}, nor to {} other objects",
+            n - 1
+        ),
+    };
+    let note = Error::input(message).at(first.location());
+    note.problems().first().cloned()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::description::{Options, declared::Takes};
+
+    fn scene(text: &str, strict: bool) -> Findings {
+        let text = format!("<scene version='3.0.0'>{text}</scene>");
+        let options = Options {
+            strict,
+            ..Options::default()
+        };
+        examine(&Description::parse(&text, Path::new("test.xml"), &options).unwrap())
+    }
+
+    fn told(problems: &[Problem]) -> Vec<String> {
+        problems.iter().map(ToString::to_string).collect()
+    }
+
+    #[test]
+    fn what_nobody_declares_is_told_in_file_order_with_the_name_that_was_meant() {
+        let Findings { problems, notes } = scene(
+            "<shape type='sphere'><float name='raduis' value='1'/><sampler type='independent'/>
+             <bsdf type='diffuse'><float name='reflectence' value='1'/></bsdf></shape>
+             <float name='kd_max_deph' value='1'/><shape type='spher'><float name='x' value='1'/></shape>",
+            false,
+        );
+        let problems = told(&problems);
+        assert_eq!(problems.len(), 4, "{problems:?}");
+        assert!(
+            problems[0].contains("no property \"kd_max_deph\"; did you mean \"kd_max_depth\"?")
+        );
+        assert!(problems[1].contains("no property \"raduis\"; did you mean \"radius\"?"));
+        assert!(problems[2].contains("no use for the sampler \"independent\""));
+        assert!(problems[3].contains("did you mean \"reflectance\"?"));
+        assert!(notes.is_empty());
+    }
+
+    #[test]
+    fn what_serves_nobody_is_noted_and_what_is_referred_to_is_looked_at() {
+        let Findings { problems, notes } = scene(
+            "<bsdf type='diffuse' id='a'><float name='wrong' value='1'/></bsdf>
+             <bsdf type='diffuse' id='b'><float name='worse' value='1'/></bsdf>
+             <texture type='bitmap'/>
+             <shape type='sphere'><ref id='b'/></shape>",
+            false,
+        );
+        let (problems, notes) = (told(&problems), told(&notes));
+        assert_eq!(problems.len(), 1, "{problems:?}");
+        assert!(problems[0].contains("worse"));
+        assert_eq!(notes.len(), 1);
+        assert!(
+            notes[0].ends_with("nothing refers to the bsdf \"diffuse\", nor to 1 other objects")
+        );
+    }
+
+    #[test]
+    fn a_strict_scene_has_nothing_of_our_own() {
+        let text = "<shape type='cylinder'><boolean name='caps' value='true'/><float name='displacement' value='1'/></shape>";
+        assert!(scene(text, false).problems.is_empty());
+        let problems = told(&scene(text, true).problems);
+        assert_eq!(problems.len(), 2);
+        assert!(problems[0].contains("\"caps\" of shape \"cylinder\" is Étendue's own"));
+    }
+
+    #[test]
+    fn every_row_stands_once_has_a_meaning_and_a_preset_that_it_can_have() {
+        use crate::description::declared::Preset;
+        for Listed {
+            kind, name, plugin, ..
+        } in plugins()
+        {
+            assert!(!plugin.about.is_empty(), "{kind} {name}");
+            let mut names = BTreeSet::new();
+            for row in plugin.rows() {
+                let place = format!("{kind} {name}: {} {}", row.name, row.takes);
+                let unnamed = matches!(row.takes, Takes::Nested(_));
+                assert!(names.insert((row.name, row.takes.to_string())), "{place}");
+                assert_eq!(row.name.is_empty(), unnamed, "{place}");
+                assert!(!row.about.is_empty(), "{place}");
+                match row.preset {
+                    Preset::Float(x) => assert!(row.range.contains(x), "{place}"),
+                    Preset::Integer(i) => assert!(row.range.contains(i as f64), "{place}"),
+                    _ => {}
+                }
+            }
+        }
+    }
+}
