@@ -21,7 +21,10 @@ macro_rules! family {
         }
 
         impl $(<$color: crate::color::ColorModel>)? $family $(<$color>)? {
-            /// The members' names, as scene files write them, and what they declare.
+            /// The names of the members, as scene files write them.
+            $vis const NAMES: &'static [&'static str] = &[$($name),+];
+
+            /// The members' names, and what they declare.
             $vis const PLUGINS: crate::description::declared::Plugins = &[$(($name, &<$type>::PLUGIN)),+];
 
             /// Builds the member that `properties` names; an unknown name is an error with a suggestion.

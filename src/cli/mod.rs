@@ -10,6 +10,7 @@ mod compare;
 mod crosscheck;
 mod info;
 mod mesh;
+mod plugins;
 mod profile;
 mod relight;
 mod render;
@@ -49,6 +50,7 @@ enum Command {
     Crosscheck(Box<crosscheck::Arguments>),
     Info(info::Arguments),
     Mesh(mesh::Arguments),
+    Plugins(plugins::Arguments),
     Profile(Box<profile::Arguments>),
     Relight(relight::Arguments),
     /// Étendue's side of a crosscheck, which starts it: answers orders on standard input
@@ -68,6 +70,7 @@ pub(crate) fn run() -> ExitCode {
         Command::Crosscheck(arguments) => crosscheck::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
         Command::Mesh(arguments) => mesh::run(&arguments),
+        Command::Plugins(arguments) => plugins::run(&arguments),
         Command::Profile(arguments) => profile::run(&arguments),
         Command::Relight(arguments) => relight::run(&arguments),
         Command::CrosscheckWorker => crosscheck::serve(),

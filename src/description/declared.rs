@@ -155,9 +155,21 @@ impl fmt::Display for Range {
             (false, false) => f.write_str("any number"),
             (true, false) if *above => write!(f, "above {least}"),
             (true, false) => write!(f, "at least {least}"),
-            (false, true) => write!(f, "at most {most}"),
-            (true, true) if *above => write!(f, "above {least} and at most {most}"),
-            (true, true) => write!(f, "from {least} to {most}"),
+            (false, true) => write!(f, "at most {}", Short(*most)),
+            (true, true) if *above => write!(f, "above {least} and at most {}", Short(*most)),
+            (true, true) => write!(f, "from {least} to {}", Short(*most)),
+        }
+    }
+}
+
+/// A number for people: without dozens of zeros.
+pub(super) struct Short(pub(super) f64);
+
+impl fmt::Display for Short {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0.abs() {
+            1e-6..1e12 | 0.0 => write!(f, "{}", self.0),
+            _ => write!(f, "{:e}", self.0),
         }
     }
 }

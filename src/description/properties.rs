@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use glam::{DMat4, DVec3};
 
-use super::declared::{Plugin, Preset, Row, Takes};
+use super::declared::{Plugin, Preset, Row, Short, Takes};
 use super::{Description, Kind, Node, NodeId, Property, Value};
 use crate::error::{Error, Location, Result};
 
@@ -230,7 +230,7 @@ impl<'a> Properties<'a> {
         let outside = row.zip(value.number());
         match outside.filter(|(row, number)| !row.range.contains(*number)) {
             Some((row, number)) => {
-                let message = format!("{name} must be {}, and {number} is not", row.range);
+                let message = format!("{name} must be {}, and {} is not", row.range, Short(number));
                 Err(self.error(name, message))
             }
             None => Ok(Some(value)),

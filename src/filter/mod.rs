@@ -80,7 +80,7 @@ mod tests {
 
     #[test]
     fn every_filter_is_even_ends_at_its_radius_and_has_a_positive_integral() {
-        for (name, _) in Filter::PLUGINS {
+        for name in Filter::NAMES {
             let text = format!(r#"<scene version="3.0.0"><rfilter type="{name}"/></scene>"#);
             let scene =
                 Description::parse(&text, Path::new("test.xml"), &Options::default()).unwrap();

@@ -134,7 +134,7 @@ mod tests {
         let inside =
             "<boolean name='hide_emitters' value='true'/><float name='timeout' value='30'/>
             <integer name='block_size' value='16'/><integer name='samples_per_pass' value='4'/>";
-        for (name, _) in Integrator::<Rgb>::PLUGINS {
+        for name in Integrator::<Rgb>::NAMES {
             let scene = integrator(name, inside);
             let properties = &scene.root().children(Kind::Integrator)[0];
             Integrator::<Rgb>::build(properties, &Context::default())

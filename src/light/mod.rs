@@ -14,11 +14,11 @@ use std::sync::Arc;
 
 use glam::{Mat3, Vec2, Vec3};
 
-use crate::color::{ColorModel, Spectral};
+use crate::color::{ColorModel, Rgb, Spectral};
 use crate::description::Properties;
 use crate::description::declared::{Row, float, transform};
 use crate::error::Result;
-use crate::family::family;
+use crate::family::{self, family};
 use crate::interaction::Interaction;
 use crate::math::{Frame, Transform};
 use crate::shape::{Geometry, SurfaceSample};
@@ -112,16 +112,20 @@ family! {
 }
 
 /// What every light that can be drawn reads.
-const SAMPLING: &[Row] = &[SAMPLING_WEIGHT];
-/// How often a light is chosen beside others; the scene reads it.
-pub const SAMPLING_WEIGHT: Row = float(
+const SAMPLING: &[Row] = &[float(
     "sampling_weight",
     1.0,
     "how often the light is chosen for light sampling, beside others; 0 is never",
 )
-.at_least(0.0);
+.at_least(0.0)];
 /// Where a light stands.
 const TO_WORLD: Row = transform("to_world", "from the light's space to the world");
+
+/// How often a light is chosen for light sampling, beside others that are alike; at least 0.
+pub fn sampling_weight(properties: &Properties<'_>) -> Result<f64> {
+    let known = Light::<Rgb>::PLUGINS.iter().copied();
+    family::declared(properties, known)?.float("sampling_weight")
+}
 
 /// The property `to_world`.
 fn to_world(properties: &Properties<'_>) -> Result<Transform> {
@@ -132,7 +136,7 @@ fn to_world(properties: &Properties<'_>) -> Result<Transform> {
 
 /// Where the property `to_world` puts the origin, whatever else it does.
 fn origin(properties: &Properties<'_>) -> Result<Vec3> {
-    let matrix = properties.transform("to_world")?.unwrap_or(DMat4::IDENTITY);
+    let matrix = properties.transform("to_world")?;
     Ok(matrix.w_axis.truncate().as_vec3())
 }
 

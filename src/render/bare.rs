@@ -326,7 +326,7 @@ mod tests {
             let bare = describe_mesh(&path, UpAxis::Y, &Options::default());
             let scene = bare.unwrap().description;
             let shape = scene.root().children(Kind::Shape)[2];
-            assert_eq!(shape.boolean("materials").unwrap(), true);
+            assert!(shape.boolean("materials").unwrap());
             let diffuse = shape.children(Kind::Bsdf)[0].children(Kind::Bsdf)[0];
             let textures = diffuse.children(Kind::Texture);
             let plugins = textures.iter().map(|t| t.plugin().to_owned());

@@ -452,7 +452,7 @@ fn an_adaptive_crop_has_the_pixels_of_the_whole_and_more_samples_where_it_is_noi
         adaptive: Some(ADAPTIVE),
         ..Options::default()
     };
-    for (sampler, _) in crate::sampler::Sampler::PLUGINS {
+    for sampler in crate::sampler::Sampler::NAMES {
         let rendered = |crop| {
             let mut scene = place.scene(SCENE);
             let overrides = Overrides {

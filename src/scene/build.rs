@@ -11,7 +11,7 @@ use crate::accel::{Recipe, Tracer};
 use crate::color::ColorModel;
 use crate::description::{Description, Kind, NodeId, Properties, Value};
 use crate::error::{Error, Problems, Result};
-use crate::light::{Light, LightContext};
+use crate::light::{self, Light, LightContext};
 use crate::material::Material;
 use crate::shape::{self, Geometry};
 use crate::texture::Palettes;
@@ -24,6 +24,8 @@ struct Builder<'d, C: ColorModel> {
     /// The materials that were made already, by node.
     known: HashMap<NodeId, MaterialId>,
     lights: Vec<Light<C>>,
+    /// By light: its `sampling_weight`.
+    weights: Vec<f64>,
     ambients: Vec<Light<C>>,
     problems: Problems,
 }
@@ -61,7 +63,9 @@ impl<C: ColorModel> Builder<'_, C> {
             self.ambients.push(light);
             return None;
         }
+        let weight = self.problems.take(light::sampling_weight(properties))?;
         self.lights.push(light);
+        self.weights.push(weight);
         Some(LightId(self.lights.len() as u32 - 1))
     }
 
@@ -231,6 +235,7 @@ pub fn build<C: ColorModel>(
         materials: Vec::new(),
         known: HashMap::new(),
         lights: Vec::new(),
+        weights: Vec::new(),
         ambients: Vec::new(),
         problems: Problems::default(),
     };
@@ -262,6 +267,7 @@ pub fn build<C: ColorModel>(
     let Builder {
         materials,
         lights,
+        weights,
         ambients,
         ..
     } = builder;
@@ -271,7 +277,7 @@ pub fn build<C: ColorModel>(
         assets.instances.clone(),
         recipe,
     );
-    let choice = Choice::new(&lights, &color, tracer.bounds());
+    let choice = Choice::new(&lights, &weights, &color, tracer.bounds());
     Ok(Scene {
         color,
         tracer,

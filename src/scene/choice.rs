@@ -21,7 +21,13 @@ pub(super) struct Choice {
 const EVEN: f64 = 0.5;
 
 impl Choice {
-    pub(super) fn new<C: ColorModel>(lights: &[Light<C>], color: &C, bounds: Bounds) -> Self {
+    /// The `weights` are how often each light is chosen beside others that are alike.
+    pub(super) fn new<C: ColorModel>(
+        lights: &[Light<C>],
+        weights: &[f64],
+        color: &C,
+        bounds: Bounds,
+    ) -> Self {
         let radius = if bounds.is_empty() {
             1.0
         } else {
@@ -46,18 +52,21 @@ impl Choice {
                 power
             }
         });
-        Self::by(&bounded.collect::<Vec<_>>())
+        Self::by(&bounded.collect::<Vec<_>>(), weights)
     }
 
-    fn by(powers: &[f64]) -> Self {
+    fn by(powers: &[f64], weights: &[f64]) -> Self {
         let total: f64 = powers.iter().sum();
         let count = powers.iter().filter(|p| **p > 0.0).count() as f64;
-        let weight = |power: f64| (1.0 - EVEN) * power / total + EVEN / count;
-        let lights = Discrete::new(
-            powers
-                .iter()
-                .map(|&p| if p > 0.0 { weight(p) } else { 0.0 }),
-        );
+        let share = |power: f64| (1.0 - EVEN) * power / total + EVEN / count;
+        let weighted = powers.iter().zip(weights);
+        let lights = Discrete::new(weighted.map(|(&power, &weight)| {
+            if power > 0.0 {
+                weight * share(power)
+            } else {
+                0.0
+            }
+        }));
         let probability = |i| {
             lights
                 .as_ref()
@@ -85,8 +94,15 @@ mod tests {
     use super::*;
 
     #[test]
+    fn weights_part_the_choices_of_lights_that_are_alike_and_0_is_never() {
+        let choice = Choice::by(&[1.0; 3], &[2.0, 0.0, 6.0]);
+        let of = |i| choice.probability(LightId(i));
+        assert_eq!([of(0), of(1), of(2)], [0.25, 0.0, 0.75]);
+    }
+
+    #[test]
     fn strong_lights_are_chosen_often_weak_ones_seldom_and_black_ones_never() {
-        let choice = Choice::by(&[3.0, 0.0, 1.0, 1e-9]);
+        let choice = Choice::by(&[3.0, 0.0, 1.0, 1e-9], &[1.0; 4]);
         let of = |i| choice.probability(LightId(i));
         assert!((0..4).map(of).sum::<f32>() - 1.0 < 1e-6);
         assert!(of(0) > of(2) && of(2) > of(3));
@@ -102,7 +118,7 @@ mod tests {
             let share = count as f32 / n as f32;
             assert!((share - of(i)).abs() < 2e-3, "{i}: {share}");
         }
-        assert!(Choice::by(&[0.0, 0.0]).sample(0.3).is_none());
-        assert!(Choice::by(&[]).sample(0.3).is_none());
+        assert!(Choice::by(&[0.0, 0.0], &[1.0; 2]).sample(0.3).is_none());
+        assert!(Choice::by(&[], &[]).sample(0.3).is_none());
     }
 }

@@ -378,7 +378,7 @@ mod tests {
             (
                 "rectangle",
                 r#"<float name="displacement" value="1"/><float name="displacement_edge" value="0"/>"#,
-                "is positive",
+                "must be above 0",
             ),
             (
                 "rectangle",

@@ -409,9 +409,9 @@ fn shapes_that_enclose_nothing_or_are_not_flat_are_refused_with_the_reason() {
         (
             "cone",
             r#"<float name="radius" value="0"/>"#.into(),
-            "a cone needs a positive radius",
+            "radius must be above 0",
         ),
-        ("triangle", points(&square[..2]), "needs a point \"p2\""),
+        ("triangle", points(&square[..2]), "needs \"p2\""),
         (
             "triangle",
             points(&["0,0,0", "1,1,1", "2,2,2"]),

@@ -159,16 +159,16 @@ fn what_is_wrong_with_a_spectrum_is_told() {
             "<spectrum type='d65'><float name='color' value='1'/></spectrum>",
             "expected an rgb",
         ),
-        ("<spectrum type='srgb'/>", "needs a color"),
+        ("<spectrum type='srgb'/>", "needs \"color\""),
         (
             "<spectrum type='srgb'><rgb name='color' value='2 0 0'/></spectrum>",
             "[0, 1]",
         ),
-        ("<spectrum type='rawconstant'/>", "needs a value"),
-        ("<spectrum type='blackbody'/>", "needs a temperature"),
+        ("<spectrum type='rawconstant'/>", "needs \"value\""),
+        ("<spectrum type='blackbody'/>", "needs \"temperature\""),
         (
             "<spectrum type='blackbody'><float name='temperature' value='-5'/></spectrum>",
-            "not negative",
+            "at least 0",
         ),
         (
             "<spectrum type='blackbody'><float name='temperature' value='5'/>

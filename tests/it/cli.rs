@@ -124,6 +124,7 @@ fn help_reads_as_it_was_blessed() {
             &["mesh", "generate", "terrain", "--help"],
         ),
         ("mesh-report", &["mesh", "report", "--help"]),
+        ("plugins", &["plugins", "--help"]),
         ("profile", &["profile", "--help"]),
     ] {
         let output = Command::new(env!("CARGO_BIN_EXE_etendue"))
@@ -142,6 +143,36 @@ fn help_reads_as_it_was_blessed() {
         let kind = name.starts_with("mesh-generate-");
         assert!(kind || text.contains("Exit status: 0 "), "{name}");
     }
+}
+
+#[test]
+fn the_page_of_plugins_is_what_the_program_prints() {
+    let place = Place::new();
+    let text = place.run("plugins --markdown").ends_with(0).stdout();
+    let page = at("docs/plugins.md");
+    if std::env::var_os("ETENDUE_BLESS").is_some() {
+        fs::write(&page, &text).unwrap();
+    }
+    let expected = fs::read_to_string(&page).unwrap_or_default();
+    assert_eq!(text, expected, "ETENDUE_BLESS=1 blesses docs/plugins.md");
+}
+
+#[test]
+fn a_plugin_is_explained_by_its_name_and_a_family_by_its_tag() {
+    let place = Place::new();
+    let told = place.run("plugins roughplastic").ends_with(0).stdout();
+    for part in ["alpha", "0.1", "int_ior", "polypropylene", "beckmann | ggx"] {
+        assert!(told.contains(part), "{part}: {told}");
+    }
+    let told = place.run("plugins sampler").ends_with(0).stdout();
+    assert!(
+        told.contains("sobol") && !told.contains("roughplastic"),
+        "{told}"
+    );
+    place.run("plugins ruffplastic").ends_with(1);
+    let told = place.run("plugins --json").ends_with(0).objects();
+    assert_eq!(told[0]["format"], 1);
+    assert!(told[0]["plugins"].as_array().unwrap().len() > 60);
 }
 
 #[test]

@@ -56,7 +56,7 @@ fn every_value_is_read_as_it_is_written() {
     .unwrap();
     let shape = scene.root().children(Kind::Shape)[0];
     assert_eq!(shape.plugin(), "a");
-    assert_eq!(shape.boolean("b").unwrap(), true);
+    assert!(shape.boolean("b").unwrap());
     assert_eq!(shape.integer("i").unwrap(), -12);
     assert_eq!(shape.float("f").unwrap(), 1.5e-3);
     assert_eq!(shape.string("s").unwrap(), " a  b ");
