@@ -209,6 +209,8 @@ impl<'a> Properties<'a> {
     /// Where a plugin reads what it has not declared, which the families' tests would see.
     fn row(&self, name: &str) -> Option<&'static Row> {
         let row = self.table?.row(name);
+        #[cfg(test)]
+        asked::note(self.kind(), self.plugin(), name);
         assert!(
             row.is_some(),
             "{} {:?} reads {name:?}, which it does not declare",
@@ -345,6 +347,7 @@ impl<'a> Properties<'a> {
 
     /// A nested plugin of that name, or the one that a reference of that name stands for.
     pub fn object(&self, name: &str) -> Result<Option<Properties<'a>>> {
+        self.row(name);
         let description = self.description;
         self.typed(name, "a nested plugin", |value| match *value {
             Value::Object(id) => Some(description.node(id)),
@@ -437,6 +440,29 @@ impl<'a> Properties<'a> {
             ))
             .at(&property.location)),
         }
+    }
+}
+
+/// What plugins have asked for, in tests.
+#[cfg(test)]
+pub(crate) mod asked {
+    use std::collections::HashSet;
+    use std::sync::{LazyLock, Mutex};
+
+    use crate::description::Kind;
+
+    type Asked = HashSet<(Kind, String, String)>;
+    static ASKED: LazyLock<Mutex<Asked>> = LazyLock::new(Mutex::default);
+
+    pub(super) fn note(kind: Kind, plugin: &str, name: &str) {
+        let entry = (kind, plugin.to_owned(), name.to_owned());
+        ASKED.lock().unwrap().insert(entry);
+    }
+
+    /// Whether the property was asked for anywhere.
+    pub(crate) fn for_(kind: Kind, plugin: &str, name: &str) -> bool {
+        let entry = (kind, plugin.to_owned(), name.to_owned());
+        ASKED.lock().unwrap().contains(&entry)
     }
 }
 

@@ -1,5 +1,5 @@
 //! From a description to a job: the scene, and what it is looked at with. What is wrong is gathered over
-//! all parts; properties that nobody read come last, for by then everybody has read. The scene is kept for
+//! all parts; properties that nobody declares come last. The scene is kept for
 //! the next render, which may be of another view or frame.
 
 use std::any::Any;

@@ -236,7 +236,7 @@ impl Session {
     /// says what is complete.
     ///
     /// # Errors
-    /// Names everything that is wrong with the scene, unread properties included; and a checkpoint that
+    /// Names everything that is wrong with the scene, unknown properties included; and a checkpoint that
     /// cannot be continued, or a lack of memory.
     pub fn render(
         &mut self,

@@ -154,7 +154,7 @@ fn the_page_of_plugins_is_what_the_program_prints() {
         fs::write(&page, &text).unwrap();
     }
     let expected = fs::read_to_string(&page).unwrap_or_default();
-    assert_eq!(text, expected, "ETENDUE_BLESS=1 blesses docs/plugins.md");
+    assert!(text == expected, "ETENDUE_BLESS=1 blesses docs/plugins.md");
 }
 
 #[test]
