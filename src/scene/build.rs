@@ -115,8 +115,10 @@ impl<C: ColorModel> Builder<'_, C> {
         for user in emitter.into_iter().chain(bsdf).chain(displacement) {
             self.check_attributes(properties, geometry, &user);
         }
+        // What is not known is for the lights' family to name.
+        let known = |emitter: &Properties<'_>| Light::<C>::NAMES.contains(&emitter.plugin());
         let light = match &emitter {
-            Some(emitter) if emitter.plugin() != "area" => {
+            Some(emitter) if emitter.plugin() != "area" && known(emitter) => {
                 let error = Error::input(format!(
                     "emitter \"{}\" cannot stand on a shape",
                     emitter.plugin()
