@@ -2,6 +2,8 @@
 //! reach the disk, and then take the target's name in one step. After any failure the old file, if there
 //! was one, is untouched and nothing new is left behind.
 
+pub(crate) mod text;
+
 use std::fs::{self, File};
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};

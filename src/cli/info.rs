@@ -85,7 +85,7 @@ fn scene(arguments: &Arguments, input: &Path) -> Result<Value> {
 }
 
 fn mesh_file(arguments: &Arguments, input: &Path) -> Result<Value> {
-    let loaded = mesh::read(input, &ReadOptions::default())?;
+    let loaded = mesh::read(input, &ReadOptions::BARE)?;
     if !arguments.quiet {
         report::warnings(&loaded.warnings);
     }

@@ -8,6 +8,7 @@ use glam::DVec3;
 use super::element::Element;
 use super::{Spectrum, Value};
 use crate::error::{Error, Location, Result};
+use crate::file::text::lines;
 
 /// The tags that hold one value.
 pub(super) const TAGS: [&str; 8] = [
@@ -193,7 +194,8 @@ fn listed_spectrum(text: &str) -> Result<Spectrum> {
 /// A text file of lines `wavelength value`; `#` begins a comment.
 fn spectrum_file(text: &str, path: &Path) -> Result<Spectrum> {
     let mut curve = Vec::new();
-    for (line, number) in text.lines().zip(1..) {
+    for (line, number) in lines(text.as_bytes()).zip(1..) {
+        let line = String::from_utf8_lossy(line);
         let line = line.split('#').next().unwrap_or_default();
         let at_line = |e: Error| e.at(&Location::of_line(path, number));
         match numbers(line).map_err(at_line)?[..] {
@@ -263,6 +265,11 @@ mod tests {
             spectrum_file(text, path).unwrap(),
             Spectrum::Curve(vec![(400.0, 1.0), (500.0, 2.0)])
         );
+        for end in ["\n", "\r\n", "\r"] {
+            let text = ["\u{feff}400 1", "500 2", "600 3", ""].join(end);
+            let curve = vec![(400.0, 1.0), (500.0, 2.0), (600.0, 3.0)];
+            assert_eq!(spectrum_file(&text, path).unwrap(), Spectrum::Curve(curve));
+        }
         let error = spectrum_file("400 1\n500 2 3\n", path).unwrap_err();
         assert!(error.to_string().starts_with("a.spd:2: "), "{error}");
     }

@@ -9,7 +9,9 @@
 //! `flip_normals` turns geometric and vertex normals over ([`Mesh::flip_normals`]).
 
 mod cache;
+mod colors;
 mod displace;
+mod far;
 mod generate;
 mod gltf;
 mod mtl;
@@ -17,6 +19,7 @@ mod normals;
 mod obj;
 mod parts;
 mod ply;
+mod polygon;
 mod read;
 mod refine;
 mod report;
@@ -39,6 +42,7 @@ pub use gltf::{GltfCamera, GltfPart, GltfScene, Projection, read_gltf};
 pub use mtl::BARE_COLOR;
 pub use parts::{Part, Parts, read_parts};
 pub use ply::{check_writable, write_ply, write_text};
+pub(crate) use polygon::triangulate;
 pub use read::{FORMATS, Format, Loaded, MeshFile, ReadMesh, ReadOptions, extension, read};
 pub(crate) use read::{contents, is_compressed};
 pub use refine::TooMany;
@@ -136,8 +140,8 @@ impl Mesh {
                 doubled.sum::<f64>() / 2.0
             })
             .collect();
-        // Added in order, so that the sum is the same whatever the threads.
-        partial.iter().sum()
+        // Added in order, so that the sum is the same whatever the threads; that of nothing is −0.
+        partial.iter().sum::<f64>() + 0.0
     }
 
     /// A hash of the vertices and triangles, and of nothing else, by all threads.
@@ -338,6 +342,12 @@ impl Mesh {
         let keep: Vec<bool> = (self.triangles.iter())
             .map(|t| t.iter().all(|&i| positions[i as usize].is_finite()))
             .collect();
+        self.keep_triangles(&keep);
+        before - self.triangles.len()
+    }
+
+    /// Drops the triangles without their flag in `keep`, and their attributes.
+    fn keep_triangles(&mut self, keep: &[bool]) {
         let mut kept = keep.iter();
         self.triangles
             .retain(|_| *kept.next().expect("one flag a triangle"));
@@ -349,7 +359,6 @@ impl Mesh {
                 keep[(i - 1) / channels]
             });
         }
-        before - self.triangles.len()
     }
 
     fn mend_normals(&mut self) -> usize {

@@ -8,6 +8,8 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
+use crate::file::text;
+
 /// The linear RGB reflectance of what has no colour of its own, in a mesh where other faces have, and of a
 /// whole bare mesh: clay.
 pub const BARE_COLOR: [f32; 3] = [0.65, 0.6, 0.52];
@@ -86,20 +88,19 @@ impl Materials {
     }
 
     fn parse(&mut self, bytes: &[u8]) {
-        let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
         let mut current = None;
-        for line in bytes.split(|&b| b == b'\n') {
+        for line in text::lines(bytes) {
             let (keyword, rest) = keyword(line);
-            match keyword {
+            match keyword.to_ascii_lowercase().as_slice() {
                 b"newmtl" => {
                     self.keep(current.take());
                     current = Some((rest.to_vec(), None));
                 }
-                b"Kd" => match (&mut current, color(rest)) {
+                b"kd" => match (&mut current, color(rest)) {
                     (Some((_, color)), Some(said)) => *color = Some(said),
                     _ => self.unusable += 1,
                 },
-                b"map_Kd" => self.textured = true,
+                b"map_kd" => self.textured = true,
                 _ => {}
             }
         }

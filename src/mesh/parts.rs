@@ -5,9 +5,13 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use super::read::{Decoded, Input, Loaded, ReadOptions, extension, with_input};
+use super::far::Far;
+use super::read::{
+    Decoded, Input, Loaded, ReadOptions, extension, read_near, warnings, with_input,
+};
 use super::{Attribute, Mesh, Per, gltf, obj, read, serialized};
 use crate::error::{Error, Location, Problem, Result};
+use crate::file::text;
 
 /// One of the meshes of a file.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,7 +36,7 @@ pub struct Parts {
 /// No file is taken apart into more.
 const MOST: usize = 1 << 16;
 
-/// Reads the file `path` part by part, whose extension says the format; with the colours of its materials.
+/// Reads the file `path` part by part, whose extension says the format, as [bare](ReadOptions::bare).
 ///
 /// # Errors
 /// As [`read`] has them; where there are more than 65536 parts.
@@ -43,7 +47,7 @@ pub fn read_parts(path: &Path) -> Result<Parts> {
         "serialized" => serialized_parts(path)?,
         _ => {
             let mut parts = Parts::default();
-            parts.add(String::new(), read(path, &ReadOptions::default())?);
+            parts.add(String::new(), read(path, &ReadOptions::BARE)?);
             parts
         }
     };
@@ -108,9 +112,23 @@ fn part_color([r, g, b, _]: &[f32; 4], mesh: &Mesh) -> Attribute {
 
 fn serialized_parts(path: &Path) -> Result<Parts> {
     let mut parts = Parts::default();
-    for mesh in with_input(path, serialized::read_all)? {
-        let warnings = Vec::new();
-        parts.add(String::new(), Decoded { mesh, warnings }.finish(path));
+    let mut meshes = with_input(path, serialized::read_all)?;
+    let bounds = meshes.iter().filter_map(Mesh::bounds);
+    let bounds = bounds.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+    // One origin for all, so that they stay together.
+    if let Some(far) = bounds.and_then(Far::of_bounds) {
+        let origin = far.origin;
+        meshes = with_input(path, |input| {
+            serialized::read_all(Input { origin, ..input })
+        })?;
+        parts.warnings = warnings(path, vec![far.moved()]);
+    }
+    for mesh in meshes {
+        let decoded = Decoded {
+            mesh,
+            ..Decoded::default()
+        };
+        parts.add(String::new(), decoded.finish(path));
     }
     Ok(parts)
 }
@@ -120,30 +138,32 @@ fn obj_parts(path: &Path) -> Result<Parts> {
     const PART: &str = "face_part";
     let bytes = with_input(path, |input| input.bytes())?;
     let groups = Groups::of(&bytes);
-    let input = Input {
-        path,
-        length: bytes.len() as u64,
-        reader: &mut &bytes[..],
-    };
-    let options = ReadOptions {
-        materials: true,
-        ..ReadOptions::default()
-    };
-    let mut decoded = obj::read(input, &options)?;
+    let is_split = (2..=MOST).contains(&groups.names.len());
+    let mut loaded = read_near(path, &ReadOptions::BARE, |origin| {
+        let input = Input {
+            path,
+            length: bytes.len() as u64,
+            origin,
+            reader: &mut &bytes[..],
+        };
+        let mut decoded = obj::read(input, &ReadOptions::BARE)?;
+        if is_split {
+            decoded.mesh.attributes.push(Attribute {
+                name: PART.to_owned(),
+                channels: 1,
+                per: Per::Face,
+                // Exact, for there are not so many parts.
+                values: groups.triangles.iter().map(|&part| part as f32).collect(),
+            });
+        }
+        Ok(decoded)
+    })?;
     drop(bytes);
     let mut parts = Parts::default();
-    if groups.names.len() < 2 || groups.names.len() > MOST {
-        parts.add(String::new(), decoded.finish(path));
+    if !is_split {
+        parts.add(String::new(), loaded);
         return Ok(parts);
     }
-    decoded.mesh.attributes.push(Attribute {
-        name: PART.to_owned(),
-        channels: 1,
-        per: Per::Face,
-        // Exact, for there are not so many parts.
-        values: groups.triangles.iter().map(|&part| part as f32).collect(),
-    });
-    let mut loaded = decoded.finish(path);
     let of = loaded.mesh.attributes.pop().expect("it was pushed last");
     if loaded.mesh.normals.is_empty() {
         loaded.mesh.compute_normals();
@@ -235,11 +255,11 @@ impl Groups {
                 names.len() as u32 - 1
             })
         };
-        let mut lines = bytes.split(|&b| b == b'\n').map(<[u8]>::trim_ascii_end);
+        let mut lines = text::lines(bytes).map(<[u8]>::trim_ascii_end);
         while let Some(mut line) = lines.next() {
             let mut words = line.split(u8::is_ascii_whitespace);
             let first = words.find(|word| !word.is_empty()).unwrap_or_default();
-            if first == keyword {
+            if first.eq_ignore_ascii_case(keyword) {
                 let name: Vec<&[u8]> = words.filter(|word| !word.is_empty()).collect();
                 let name = String::from_utf8_lossy(&name.join(&b' ')).into_owned();
                 current = Some(enter(name, &mut groups.names));
@@ -262,7 +282,7 @@ impl Groups {
                 }
             }
             // The keyword counts as one.
-            if first == b"f" && corners > 3 {
+            if first.eq_ignore_ascii_case(b"f") && corners > 3 {
                 let group = *current.get_or_insert_with(|| enter(String::new(), &mut groups.names));
                 groups.triangles.extend((3..corners).map(|_| group));
             }

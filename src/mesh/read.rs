@@ -7,7 +7,10 @@ use std::io::{self, BufReader, Read, Seek};
 use std::path::{Path, PathBuf};
 
 use flate2::bufread::MultiGzDecoder;
+use glam::DVec3;
 
+use super::far::Far;
+use super::polygon::Polygons;
 use super::{Mesh, Repairs, gltf, obj, ply, serialized, stl};
 use crate::error::{Error, Location, Problem, Result};
 
@@ -22,6 +25,21 @@ pub struct ReadOptions {
     /// Whether an OBJ file's materials (`mtllib`, `usemtl`) give the mesh an attribute `face_color`: linear
     /// RGB, [`BARE_COLOR`](super::BARE_COLOR) where a face has none. Without any colour there is no attribute.
     pub materials: bool,
+    /// Whether the file is all there is, and is read for what is in it, not as a scene's shape is in Mitsuba: with
+    /// the materials of an OBJ file and the colours of its vertices, colours in whole numbers divided by their range,
+    /// polygons covered as they are, concave or not, and coordinates that are far from the origin counted from a
+    /// nearer one.
+    pub bare: bool,
+}
+
+impl ReadOptions {
+    /// For a file that is all there is.
+    pub const BARE: Self = Self {
+        flip_tex_coords: None,
+        shape_index: 0,
+        materials: false,
+        bare: true,
+    };
 }
 
 /// A mesh as read.
@@ -58,6 +76,8 @@ pub struct ReadMesh {
 pub struct Format {
     /// File extensions, in lower case; the first is the name of the scene file's shape, where it has one.
     pub extensions: &'static [&'static str],
+    /// Whether [`Input::origin`] is heeded.
+    has_origin: bool,
     read: fn(Input<'_>, &ReadOptions) -> Result<Decoded>,
 }
 
@@ -65,22 +85,27 @@ pub struct Format {
 pub const FORMATS: &[Format] = &[
     Format {
         extensions: &["ply"],
+        has_origin: true,
         read: ply::read,
     },
     Format {
         extensions: &["obj"],
+        has_origin: true,
         read: obj::read,
     },
     Format {
         extensions: &["serialized"],
+        has_origin: true,
         read: serialized::read,
     },
     Format {
         extensions: &["stl"],
+        has_origin: true,
         read: stl::read,
     },
     Format {
         extensions: &["gltf", "glb"],
+        has_origin: false,
         read: gltf::read,
     },
 ];
@@ -91,8 +116,39 @@ pub const FORMATS: &[Format] = &[
 /// Where the file cannot be opened, has an unknown extension or is malformed; the message says where.
 pub fn read(path: &Path, options: &ReadOptions) -> Result<Loaded> {
     let format = format_of(path)?;
-    let decoded = with_input(path, |input| (format.read)(input, options))?;
-    Ok(decoded.finish(path))
+    let decode = |origin| {
+        with_input(path, |input| {
+            (format.read)(Input { origin, ..input }, options)
+        })
+    };
+    if format.has_origin {
+        read_near(path, options, decode)
+    } else {
+        Ok(decode(DVec3::ZERO)?.finish(path))
+    }
+}
+
+/// What `decode` makes of the file `path` with an origin to subtract: none at first, and then one that is near a bare
+/// mesh whose coordinates are far from it.
+pub(super) fn read_near(
+    path: &Path,
+    options: &ReadOptions,
+    decode: impl Fn(DVec3) -> Result<Decoded>,
+) -> Result<Loaded> {
+    let mut loaded = decode(DVec3::ZERO)?.finish(path);
+    let Some(far) = Far::of(&loaded.mesh) else {
+        return Ok(loaded);
+    };
+    if options.bare {
+        drop(loaded);
+        let mut decoded = decode(far.origin)?;
+        decoded.warnings.push(far.moved());
+        return Ok(decoded.finish(path));
+    }
+    if far.is_coarse(&loaded.mesh) {
+        loaded.warnings.extend(warnings(path, vec![far.coarse()]));
+    }
+    Ok(loaded)
 }
 
 /// Does `work` on what is in the file `path`, inflated where it is compressed.
@@ -102,6 +158,7 @@ pub(super) fn with_input<T>(path: &Path, work: impl FnOnce(Input<'_>) -> Result<
         return work(Input {
             path,
             length,
+            origin: DVec3::ZERO,
             reader: &mut &file,
         });
     }
@@ -116,6 +173,7 @@ pub(super) fn with_input<T>(path: &Path, work: impl FnOnce(Input<'_>) -> Result<
     work(Input {
         path,
         length,
+        origin: DVec3::ZERO,
         reader: &mut inflate(&file),
     })
 }
@@ -205,6 +263,8 @@ pub(super) struct Input<'a> {
     pub(super) path: &'a Path,
     /// Bytes that `reader` will give.
     pub(super) length: u64,
+    /// What is subtracted from every position, before it is rounded.
+    pub(super) origin: DVec3,
     pub(super) reader: &'a mut (dyn Read + Send),
 }
 
@@ -225,11 +285,14 @@ pub(super) struct Decoded {
     pub(super) mesh: Mesh,
     /// What was odd, in words; the file's name is added to them.
     pub(super) warnings: Vec<String>,
+    /// Which of the triangles are fans.
+    pub(super) polygons: Polygons,
 }
 
 impl Decoded {
     /// Checks the mesh, and says in the warnings what that mended.
     pub(super) fn finish(mut self, path: &Path) -> Loaded {
+        self.warnings.extend(self.polygons.settle(&mut self.mesh));
         let Repairs {
             dropped_triangles,
             mended_normals,
@@ -285,12 +348,16 @@ pub(super) mod testing {
         options: &ReadOptions,
     ) -> Result<Loaded> {
         let path = Path::new(name);
-        let mut reader = bytes;
-        let input = Input {
-            path,
-            length: bytes.len() as u64,
-            reader: &mut reader,
-        };
-        Ok((format_of(path)?.read)(input, options)?.finish(path))
+        let format = format_of(path)?;
+        read_near(path, options, |origin| {
+            let mut reader = bytes;
+            let input = Input {
+                path,
+                length: bytes.len() as u64,
+                origin,
+                reader: &mut reader,
+            };
+            (format.read)(input, options)
+        })
     }
 }

@@ -6,7 +6,7 @@
 use std::io::Read;
 
 use flate2::read::ZlibDecoder;
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 
 use super::read::{Decoded, Input, ReadOptions};
 use super::{Attribute, Mesh, Per};
@@ -23,8 +23,9 @@ const MOST_INFLATED: u64 = 1032;
 
 pub(super) fn read(input: Input<'_>, options: &ReadOptions) -> Result<Decoded> {
     let place = Location::of_file(input.path);
+    let origin = input.origin;
     let bytes = input.bytes()?;
-    let mesh = read_shape(&bytes, options.shape_index).map_err(|message| {
+    let mesh = read_shape(&bytes, options.shape_index, origin).map_err(|message| {
         let error = Error::input(message).at(&place);
         match bytes.first_chunk::<2>().map(|&b| u16::from_le_bytes(b)) {
             Some(MAGIC) => error,
@@ -37,27 +38,28 @@ pub(super) fn read(input: Input<'_>, options: &ReadOptions) -> Result<Decoded> {
     }
     Ok(Decoded {
         mesh,
-        warnings: Vec::new(),
+        ..Decoded::default()
     })
 }
 
 /// All meshes of the file, in its order.
 pub(super) fn read_all(input: Input<'_>) -> Result<Vec<Mesh>> {
     let place = Location::of_file(input.path);
+    let origin = input.origin;
     let bytes = input.bytes()?;
     let located = |message| Error::input(message).at(&place);
     // Of a broken file the first says what is wrong; each takes four bytes of the table at least.
     let said = bytes.last_chunk().map_or(1, |&n| u32::from_le_bytes(n));
     let most = u32::try_from(bytes.len() / 4).unwrap_or(u32::MAX);
     (0..said.clamp(1, most.max(1)) as usize)
-        .map(|index| read_shape(&bytes, index).map_err(located))
+        .map(|index| read_shape(&bytes, index, origin).map_err(located))
         .collect()
 }
 
 /// What is read, or what is wrong, in words.
 type OrWhy<T> = std::result::Result<T, String>;
 
-fn read_shape(bytes: &[u8], index: usize) -> OrWhy<Mesh> {
+fn read_shape(bytes: &[u8], index: usize, origin: DVec3) -> OrWhy<Mesh> {
     let version = version(bytes).ok_or("the file is no serialized mesh")?;
     let stream = shape(bytes, version, index)?;
     if self::version(stream) != Some(version) {
@@ -71,7 +73,7 @@ fn read_shape(bytes: &[u8], index: usize) -> OrWhy<Mesh> {
         inflated: ZlibDecoder::new(stream),
         double: false,
     };
-    stream.mesh(version)
+    stream.mesh(version, origin)
 }
 
 /// The version after the magic number, if it is one that is known.
@@ -119,7 +121,7 @@ struct Stream<'a> {
 }
 
 impl Stream<'_> {
-    fn mesh(&mut self, version: u16) -> OrWhy<Mesh> {
+    fn mesh(&mut self, version: u16, origin: DVec3) -> OrWhy<Mesh> {
         let flags = u32::from_le_bytes(self.array()?);
         self.double = flags & DOUBLE != 0;
         if version == 4 {
@@ -143,7 +145,7 @@ impl Stream<'_> {
         let vertices = vertices as usize;
         let mut mesh = Mesh {
             positions: self
-                .rows(vertices)?
+                .rows_from(origin.to_array(), vertices)?
                 .into_iter()
                 .map(Vec3::from_array)
                 .collect(),
@@ -189,6 +191,15 @@ impl Stream<'_> {
 
     /// `count` rows of `N` numbers. Memory grows with what is read, not with what is promised.
     fn rows<const N: usize>(&mut self, count: usize) -> OrWhy<Vec<[f32; N]>> {
+        self.rows_from([0.0; N], count)
+    }
+
+    /// The same, with `origin` subtracted.
+    fn rows_from<const N: usize>(
+        &mut self,
+        origin: [f64; N],
+        count: usize,
+    ) -> OrWhy<Vec<[f32; N]>> {
         let size = if self.double { 8 } else { 4 };
         let mut rows = Vec::new();
         let double = self.double;
@@ -196,12 +207,13 @@ impl Stream<'_> {
             rows.extend(chunk.chunks_exact(N * size).map(|row| {
                 std::array::from_fn(|i| {
                     let number = &row[i * size..];
-                    if double {
+                    let number = if double {
                         f64::from_le_bytes(*number.first_chunk().expect("a row is long enough"))
-                            as f32
                     } else {
                         f32::from_le_bytes(*number.first_chunk().expect("a row is long enough"))
-                    }
+                            .into()
+                    };
+                    (number - origin[i]) as f32
                 })
             }));
         })?;

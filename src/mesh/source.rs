@@ -7,6 +7,7 @@ use std::path::Path;
 
 use super::read::Input;
 use crate::error::{Error, Location, Result};
+use crate::file::text;
 
 /// Bytes asked for at a time: they stay in the second-level cache.
 const BUFFER: usize = 1 << 17;
@@ -27,6 +28,8 @@ pub(super) struct Source<'a> {
     filled: usize,
     /// Line of the last word or line, from 1; 0 in binary data.
     line: u32,
+    /// Whether lines end in a CR alone, as the first one does: an LF after it is no more part of the end.
+    returns: bool,
 }
 
 impl<'a> Source<'a> {
@@ -39,6 +42,7 @@ impl<'a> Source<'a> {
             used: 0,
             filled: 0,
             line: 1,
+            returns: false,
         }
     }
 
@@ -104,17 +108,31 @@ impl<'a> Source<'a> {
         Ok(())
     }
 
-    /// The next line, without its end.
+    /// Goes past a byte-order mark.
+    pub(super) fn skip_mark(&mut self) -> Result<()> {
+        let mark = text::BYTE_ORDER_MARK;
+        if self.peek(mark.len())?.starts_with(mark) {
+            self.consume(mark.len());
+        }
+        Ok(())
+    }
+
+    /// The next line, without its end: LF, CRLF or CR.
     pub(super) fn line(&mut self) -> Result<String> {
-        let shown = self.peek(LONGEST_LINE)?;
-        let end = shown.iter().take(LONGEST_LINE).position(|&b| b == b'\n');
-        let Some(end) = end else {
+        let (is_first, mut returns) = (self.line == 1, self.returns);
+        let shown = self.peek(LONGEST_LINE + 1)?;
+        let mut bytes = shown.iter().take(LONGEST_LINE);
+        let Some(end) = bytes.position(|b| matches!(b, b'\n' | b'\r')) else {
             return Err(self.error("the file ends, or a line does not, before the header ends"));
         };
-        let line = String::from_utf8_lossy(&shown[..end])
-            .trim_end_matches('\r')
-            .to_owned();
-        self.consume(end + 1);
+        let line = String::from_utf8_lossy(&shown[..end]).into_owned();
+        let both = shown[end..].starts_with(b"\r\n");
+        if is_first {
+            returns = shown[end] == b'\r' && !both;
+        }
+        // Binary data after a header of such lines may begin with the byte of an LF.
+        self.consume(if both && !returns { end + 2 } else { end + 1 });
+        self.returns = returns;
         self.line = self.line.saturating_add(1);
         Ok(line)
     }
@@ -122,10 +140,10 @@ impl<'a> Source<'a> {
     /// The number that the next word says.
     pub(super) fn number(&mut self) -> Result<f64> {
         loop {
+            let end = if self.returns { b'\r' } else { b'\n' };
             let shown = self.peek(1)?;
             let blank = shown.iter().take_while(|b| b.is_ascii_whitespace());
-            let (blanks, lines) =
-                blank.fold((0, 0), |(n, l), &b| (n + 1, l + u32::from(b == b'\n')));
+            let (blanks, lines) = blank.fold((0, 0), |(n, l), &b| (n + 1, l + u32::from(b == end)));
             let more = blanks == shown.len() && blanks > 0;
             self.consume(blanks);
             self.line = self.line.saturating_add(lines);
@@ -171,6 +189,8 @@ impl<'a> Source<'a> {
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
+
     use super::*;
 
     #[test]
@@ -183,6 +203,7 @@ mod tests {
         let mut source = Source::new(Input {
             path,
             length,
+            origin: DVec3::ZERO,
             reader: &mut reader,
         });
         for i in 0..count {
@@ -199,6 +220,7 @@ mod tests {
         let input = Input {
             path: Path::new("numbers"),
             length: 10,
+            origin: DVec3::ZERO,
             reader: &mut reader,
         };
         let mut source = Source::new(input);

@@ -6,28 +6,35 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use super::Mesh;
 use super::read::{Decoded, Input, ReadOptions};
 use crate::error::{Error, Location, Result};
+use crate::file::text;
 
 /// A comment of 80 bytes and the count of triangles.
 const HEADER: usize = 84;
-/// A normal and three corners of f32, and 16 bits without a meaning.
+/// A normal and three corners of f32, and two bytes of attributes.
 const ROW: usize = 50;
+const ATTRIBUTES: usize = 48;
 
 pub(super) fn read(input: Input<'_>, _options: &ReadOptions) -> Result<Decoded> {
     let path = input.path;
+    let origin = input.origin;
     let bytes = input.bytes()?;
     let count = bytes.get(HEADER - 4..).and_then(|b| b.first_chunk());
     let count = count.map(|&b| u32::from_le_bytes(b) as u64);
     let promised = count.map(|n| HEADER as u64 + n * ROW as u64);
-    let mut builder = Builder::default();
+    let mut builder = Builder {
+        origin,
+        ..Builder::default()
+    };
     let mut warnings = Vec::new();
-    let text = bytes.trim_ascii_start().starts_with(b"solid")
+    let first = text::without_mark(&bytes).trim_ascii_start();
+    let is_text = (first.get(..5)).is_some_and(|word| word.eq_ignore_ascii_case(b"solid"))
         && !bytes[..bytes.len().min(1024)].contains(&0);
-    if text && promised != Some(bytes.len() as u64) {
+    if is_text && promised != Some(bytes.len() as u64) {
         builder.read_text(&bytes, path)?;
     } else {
         let (Some(count), Some(promised)) = (count, promised) else {
@@ -51,17 +58,28 @@ pub(super) fn read(input: Input<'_>, _options: &ReadOptions) -> Result<Decoded> 
                 bytes.len() - end
             ));
         }
-        builder.read_binary(&bytes[HEADER..end]);
+        let rows = &bytes[HEADER..end];
+        let colored = rows.chunks_exact(ROW);
+        let colored = colored.filter(|row| row[ATTRIBUTES..] != [0; 2]).count();
+        if colored > 0 {
+            warnings.push(format!(
+                "{colored} triangles have attribute bytes, which some programs take for colours: they are left out"
+            ));
+        }
+        builder.read_binary(rows);
     }
     Ok(Decoded {
         mesh: builder.mesh,
         warnings,
+        ..Decoded::default()
     })
 }
 
 #[derive(Default)]
 struct Builder {
     mesh: Mesh,
+    /// What is subtracted from positions.
+    origin: DVec3,
     /// The vertex at a place.
     vertices: HashMap<[u32; 3], u32>,
 }
@@ -74,28 +92,33 @@ impl Builder {
                 f32::from_le_bytes(*row[at..].first_chunk().expect("a row has 50 bytes"))
             };
             let corner = |at: usize| Vec3::new(number(at), number(at + 4), number(at + 8));
-            self.push([corner(12), corner(24), corner(36)]);
+            let place = |at: usize| (corner(at).as_dvec3() - self.origin).as_vec3();
+            self.push([12, 24, 36].map(place));
         }
     }
 
-    /// `vertex x y z`, three times a facet; the words between say nothing more.
+    /// `vertex x y z`, three times a facet; the words between, in upper or lower case, say nothing more.
     fn read_text(&mut self, bytes: &[u8], path: &Path) -> Result<()> {
         let mut corners = Vec::new();
-        for (line, number) in bytes.split(|&b| b == b'\n').zip(1..) {
+        for (line, number) in text::lines(bytes).zip(1..) {
             let wrong = |message: &str| Error::input(message).at(&Location::of_line(path, number));
             let mut words = line
                 .split(u8::is_ascii_whitespace)
                 .filter(|w| !w.is_empty());
-            match words.next() {
+            let first = words.next().map(<[u8]>::to_ascii_lowercase);
+            match first.as_deref() {
                 Some(b"vertex") => {
                     let numbers = words.map(|w| std::str::from_utf8(w).ok()?.parse().ok());
-                    let numbers: Option<Vec<f32>> = numbers.take(4).collect();
+                    let numbers: Option<Vec<f64>> = numbers.take(4).collect();
                     match numbers.as_deref() {
-                        Some(&[x, y, z]) => corners.push(Vec3::new(x, y, z)),
+                        Some(&[x, y, z]) => {
+                            corners.push((DVec3::new(x, y, z) - self.origin).as_vec3())
+                        }
                         _ => return Err(wrong("three numbers are wanted after \"vertex\"")),
                     }
                 }
-                Some(b"endloop" | b"endfacet" | b"outer" | b"facet") => {
+                // "end loop" and the like stand for "endloop".
+                Some(b"endloop" | b"endfacet" | b"end" | b"outer" | b"facet") => {
                     match corners[..] {
                         [] => {}
                         [a, b, c] => self.push([a, b, c]),

@@ -99,7 +99,7 @@ impl Stage {
         let source = match subject {
             Subject::Terrain => Source::Terrain,
             Subject::Mesh { path, up } => {
-                let mesh = read(path, &ReadOptions::default())?.mesh;
+                let mesh = read(path, &ReadOptions::BARE)?.mesh;
                 if mesh.triangles.is_empty() {
                     return Err(Error::input(format!(
                         "{} holds no triangle",

@@ -1,15 +1,16 @@
 //! A bare mesh as a scene: framed by its own camera (glTF) or an automatic one, on a ground, under a soft sky
-//! and a key light, in the colours of its vertices, faces or materials where the file has any.
+//! and a key light, in the colours of its vertices, faces or materials where the file has any. The ground is a little
+//! lower than the mesh, so that what is flat does not lie in it.
 
 use std::path::Path;
 
 use glam::{DMat4, DVec3, Vec3};
 
 use crate::description::{Description, Options};
-use crate::error::{Error, Result};
+use crate::error::{Error, Location, Result};
 use crate::mesh::{
-    BARE_COLOR, GltfCamera, Mesh, MeshFile, Projection, ReadMesh, ReadOptions, extension, read,
-    read_gltf,
+    Attribute, BARE_COLOR, GltfCamera, Mesh, MeshFile, Projection, ReadMesh, ReadOptions,
+    extension, read, read_gltf,
 };
 
 /// Which way is up in a mesh file.
@@ -56,6 +57,9 @@ fn plugin(path: &Path) -> Option<&'static str> {
 /// The camera's vertical field of view in degrees.
 const FOV: f32 = 30.0;
 
+/// How far below the mesh the ground is, as a part of the mesh's radius.
+const GROUND_GAP: f32 = 1e-3;
+
 /// A scene around a mesh.
 #[derive(Debug)]
 pub struct BareMesh {
@@ -73,17 +77,22 @@ pub fn describe_mesh(path: &Path, up: UpAxis, options: &Options) -> Result<BareM
             path.display()
         )));
     };
-    let read_options = ReadOptions {
-        materials: plugin == "obj",
-        ..ReadOptions::default()
-    };
-    let loaded = read(path, &read_options)?;
+    let read_options = ReadOptions::BARE;
+    let mut loaded = read(path, &read_options)?;
     let Some(bounds) = loaded.mesh.bounds() else {
         return Err(Error::input(format!(
             "{} holds no triangle",
             path.display()
         )));
     };
+    if !has_area(&loaded.mesh) {
+        let message = "none of the triangles has an area: there is nothing to see";
+        return Err(Error::input(message).at(&Location::of_file(path)));
+    }
+    for message in unseen(&loaded.mesh) {
+        let warning = Error::input(message).at(&Location::of_file(path));
+        loaded.warnings.extend_from_slice(warning.problems());
+    }
     let up = up.direction();
     let camera = match plugin {
         "gltf" => read_gltf(path, &read_options)?.camera,
@@ -144,13 +153,38 @@ fn own_camera(camera: &GltfCamera) -> Option<OwnCamera> {
     }
 }
 
+/// Whether a triangle can be seen from somewhere.
+fn has_area(mesh: &Mesh) -> bool {
+    mesh.triangles.iter().any(|t| {
+        let [a, b, c] = mesh.corners(t).map(Vec3::as_dvec3);
+        (b - a).cross(c - a) != DVec3::ZERO
+    })
+}
+
+/// The mesh's own colours, those first that are shown.
+fn colors(mesh: &Mesh) -> impl Iterator<Item = &Attribute> {
+    let named = |name| mesh.attributes.iter().find(move |a| a.name == name);
+    let colors = ["vertex_color", "face_color"].into_iter().filter_map(named);
+    colors.filter(|a| a.channels >= 3)
+}
+
+/// What of the mesh's colours is not shown, in words.
+fn unseen(mesh: &Mesh) -> Vec<String> {
+    let mut colors = colors(mesh);
+    let Some(shown) = colors.next() else {
+        return Vec::new();
+    };
+    let mut unseen = Vec::new();
+    if shown.channels == 4 && shown.values.chunks_exact(4).any(|color| color[3] < 1.0) {
+        unseen.push(format!("the alpha channel of {} is not shown", shown.name));
+    }
+    unseen.extend(colors.map(|other| format!("{} is not shown, but {}", other.name, shown.name)));
+    unseen
+}
+
 /// The mesh's reflectance: its own colours, or that of clay.
 fn reflectance(mesh: &Mesh) -> String {
-    let own = mesh
-        .attributes
-        .iter()
-        .find(|a| a.channels >= 3 && ["vertex_color", "face_color"].contains(&a.name.as_str()));
-    match own {
+    match colors(mesh).next() {
         Some(attribute) => format!(
             r#"<texture name="reflectance" type="mesh_attribute"><string name="name" value="{}"/></texture>"#,
             attribute.name
@@ -182,7 +216,7 @@ fn scene(subject: &Subject<'_>) -> String {
     let distance = radius / (FOV.to_radians() / 2.0).sin();
     let eye = center + distance * view;
     let key = center + 4.0 * radius * (-0.9 * right + 0.7 * front + 1.2 * up).normalize();
-    let ground = center + up * (min - center).dot(up);
+    let ground = center + up * ((min - center).dot(up) - GROUND_GAP * radius);
     let [near, far] = [distance * 1e-3, distance * 100.0];
     let point = |p: Vec3| format!("{}, {}, {}", p.x, p.y, p.z);
     let file = path.file_name().unwrap_or_default().to_string_lossy();
@@ -238,7 +272,8 @@ fn scene(subject: &Subject<'_>) -> String {
     </shape>
     <shape type="{plugin}">
         <string name="filename" value="{file}"/>
-        <boolean name="face_normals" value="{flat}"/>{materials}
+        <boolean name="face_normals" value="{flat}"/>
+        <boolean name="bare" value="true"/>
         <bsdf type="twosided"><bsdf type="diffuse">{reflectance}</bsdf></bsdf>
     </shape>
 </scene>"#,
@@ -250,10 +285,6 @@ fn scene(subject: &Subject<'_>) -> String {
         front = point(front),
         // A glTF without normals is meant to be flat; other formats leave them to be computed.
         flat = plugin == "gltf" && subject.mesh.normals.is_empty(),
-        materials = match plugin {
-            "obj" => r#"<boolean name="materials" value="true"/>"#,
-            _ => "",
-        },
         reflectance = reflectance(subject.mesh),
     )
 }
@@ -326,7 +357,7 @@ mod tests {
             let bare = describe_mesh(&path, UpAxis::Y, &Options::default());
             let scene = bare.unwrap().description;
             let shape = scene.root().children(Kind::Shape)[2];
-            assert!(shape.boolean("materials").unwrap());
+            assert!(shape.boolean("bare").unwrap());
             let diffuse = shape.children(Kind::Bsdf)[0].children(Kind::Bsdf)[0];
             let textures = diffuse.children(Kind::Texture);
             let plugins = textures.iter().map(|t| t.plugin().to_owned());

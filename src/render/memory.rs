@@ -2,12 +2,13 @@
 //! that swaps or a process that is killed. The film's share is exact; meshes are estimated by what their
 //! files announce and then known; trees go by the number of primitives.
 
-use std::io::{BufRead, BufReader, Read};
+use std::io::Read;
 use std::path::Path;
 
 use super::blocks::Grid;
 use crate::description::{Description, Part};
 use crate::error::{Error, Result};
+use crate::file::text;
 use crate::mesh;
 use crate::sensor::Film;
 
@@ -159,9 +160,11 @@ fn ply_counts(path: &Path) -> (u64, u64) {
     let Ok(contents) = mesh::contents(path) else {
         return counts;
     };
-    for line in BufReader::new(contents.take(HEAD)).split(b'\n') {
-        let Ok(line) = line else { break };
-        let line = String::from_utf8_lossy(&line);
+    let mut head = Vec::new();
+    // Of a damaged file what can be read.
+    contents.take(HEAD).read_to_end(&mut head).ok();
+    for line in text::lines(&head) {
+        let line = String::from_utf8_lossy(line).to_ascii_lowercase();
         let words: Vec<&str> = line.split_whitespace().collect();
         match words[..] {
             ["element", "vertex", n] => counts.0 = n.parse().unwrap_or(0),

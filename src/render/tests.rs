@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Duration;
 
+use glam::Vec3;
+
 use super::*;
 use crate::description;
 use crate::mesh::read;
@@ -427,6 +429,85 @@ fn a_bare_mesh_is_in_the_middle_of_its_turntable() {
     let (low, high) = mesh.bounds().unwrap();
     let off = 0.5 * (bounds.min + bounds.max) - 0.5 * (low + high);
     assert!(off.x.abs() < 1e-3 && off.z.abs() < 1e-3, "{off}");
+}
+
+/// A red square that spans `first` and `second` from `corner`.
+fn red_square(corner: Vec3, first: Vec3, second: Vec3) -> String {
+    let head = FLOOR
+        .replace("vertex 3", "vertex 4")
+        .replace("face 1", "face 2");
+    let head = head.replace(
+        "float z\n",
+        "float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n",
+    );
+    let (head, _) = head.split_once("-9").unwrap();
+    let corners = [
+        corner,
+        corner + first,
+        corner + first + second,
+        corner + second,
+    ];
+    let corners = corners.map(|p| format!("{} {} {} 230 20 20\n", p.x, p.y, p.z));
+    format!("{head}{}3 0 1 2\n3 0 2 3\n", corners.concat())
+}
+
+#[test]
+fn a_flat_bare_mesh_is_seen_whichever_way_it_lies() {
+    let place = Place::new();
+    let path = place.path("flat.ply");
+    let axes = [Vec3::X, Vec3::Y, Vec3::Z];
+    for (up, size, axis) in [
+        (UpAxis::Y, 1.0, 0),
+        (UpAxis::Y, 1.0, 1),
+        (UpAxis::Y, 1e-3, 1),
+        (UpAxis::Y, 1e5, 1),
+        (UpAxis::Y, 1.0, 2),
+        (UpAxis::Z, 1.0, 0),
+        (UpAxis::Z, 1.0, 1),
+        (UpAxis::Z, 1.0, 2),
+    ] {
+        let (first, second) = (size * axes[(axis + 1) % 3], size * axes[(axis + 2) % 3]);
+        let near = size * Vec3::new(3.0, -40.0, 7.0);
+        for (corner, first, second) in [(near, first, second), (Vec3::splat(9e5), second, first)] {
+            if corner != near && size < 1.0 {
+                continue; // the test's own numbers would not keep it
+            }
+            fs::write(&path, red_square(corner, first, second)).unwrap();
+            let bare = describe_mesh(&path, up, &description::Options::default()).unwrap();
+            let mut description = bare.description;
+            let overrides = Overrides {
+                size: Some((40, 30)),
+                spp: Some(4),
+                ..Overrides::default()
+            };
+            overrides.apply(&mut description);
+            let image = render(&description, &Options::default(), &Silent)
+                .unwrap()
+                .image;
+            let pixels = (0..30).flat_map(|y| (0..40).map(move |x| (x, y)));
+            let is_red = |&(x, y): &(u32, u32)| image.get(x, y, 0) > 3.0 * image.get(x, y, 1);
+            let red = pixels.filter(is_red).count();
+            assert!(red > 30, "{red} pixels of {up:?} {size} {axis} at {corner}");
+        }
+    }
+}
+
+#[test]
+fn a_bare_mesh_without_an_area_is_refused_in_words() {
+    let place = Place::new();
+    let path = place.path("line.ply");
+    for second in [Vec3::ZERO, 2.0 * Vec3::X] {
+        for first in [Vec3::ZERO, Vec3::X] {
+            let second = if first == Vec3::ZERO { first } else { second };
+            fs::write(&path, red_square(Vec3::ONE, first, second)).unwrap();
+            let refused = describe_mesh(&path, UpAxis::Y, &description::Options::default());
+            let message = refused.unwrap_err().to_string();
+            assert!(
+                message.contains("none of the triangles has an area"),
+                "{message}"
+            );
+        }
+    }
 }
 
 #[test]

@@ -24,6 +24,9 @@ pub struct TriangleMesh {
     areas: OnceLock<Option<Discrete>>,
     /// The rectangle that it is, if it is one.
     quad: Option<Quad>,
+    /// Whether its triangles have been turned over: where it has no texture coordinates, u and v are those of the
+    /// triangles as they were, as in Mitsuba.
+    flipped: bool,
     hash: OnceLock<blake3::Hash>,
 }
 
@@ -34,6 +37,7 @@ impl TriangleMesh {
             quad: Quad::of(&mesh),
             mesh,
             areas: OnceLock::new(),
+            flipped: false,
             hash: OnceLock::new(),
         }
     }
@@ -114,7 +118,12 @@ impl TriangleMesh {
     /// The texture coordinates at a point of a triangle.
     fn uv_at(&self, triangle: u32, b: [f32; 3]) -> Vec2 {
         if self.mesh.uvs.is_empty() {
-            return Vec2::new(b[1], b[2]);
+            let [_, u, v] = b;
+            return if self.flipped {
+                Vec2::new(v, u)
+            } else {
+                Vec2::new(u, v)
+            };
         }
         let corners = self.mesh.triangles[triangle as usize];
         let [uv0, uv1, uv2] = corners.map(|i| self.mesh.uvs[i as usize]);
@@ -132,7 +141,7 @@ impl TriangleMesh {
     fn tangents(&self, triangle: u32, [a, b, c]: [Vec3; 3]) -> (Vec3, Vec3) {
         let (e1, e2) = (b - a, c - a);
         if self.mesh.uvs.is_empty() {
-            return (e1, e2);
+            return if self.flipped { (e2, e1) } else { (e1, e2) };
         }
         let [uv0, uv1, uv2] =
             self.mesh.triangles[triangle as usize].map(|i| self.mesh.uvs[i as usize]);
@@ -277,11 +286,13 @@ fn place_in(setting: &Setting<'_>, mut mesh: Mesh, properties: &Properties<'_>) 
             _ => mesh.compute_normals(),
         }
     }
-    if properties.boolean("flip_normals")? {
+    let flipped = properties.boolean("flip_normals")?;
+    if flipped {
         mesh.flip_normals();
         hash = None;
     }
     let mesh = TriangleMesh {
+        flipped,
         hash: hash.map(OnceLock::from).unwrap_or_default(),
         ..TriangleMesh::new(mesh)
     };
@@ -304,8 +315,10 @@ fn place_in(setting: &Setting<'_>, mut mesh: Mesh, properties: &Properties<'_>) 
 pub(super) fn file(properties: &Properties<'_>, options: ReadOptions) -> Result<MeshFile> {
     let path = properties.file("filename")?;
     let flip_tex_coords = properties.given("flip_tex_coords")?;
+    let bare = properties.boolean("bare")?;
     let options = ReadOptions {
         flip_tex_coords,
+        bare,
         ..options
     };
     Ok(MeshFile { path, options })

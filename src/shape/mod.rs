@@ -336,6 +336,7 @@ const FILE: &[Row] = &[
     file("filename", "the mesh"),
     boolean("flip_tex_coords", false, "whether v runs from the top")
         .absent("true for obj, else false"),
+    boolean("bare", false, "whether the file is read as one without a scene: with its colours, its concave polygons as they are, and near the origin").own(),
 ];
 
 /// Shapes made of shapes, which the scene puts together: several in a space of their own, and those once

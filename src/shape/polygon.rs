@@ -3,14 +3,13 @@
 //! are `uv` (a string of as many pairs), or else [0, 1]² is the rectangle around the polygon whose u runs along its first
 //! edge. Its plane is Newell's (Sutherland, Sproull and Schumacker 1974); ears are clipped by `earcut`.
 
-use earcut::Earcut;
 use glam::{DMat4, DVec2, DVec3, Vec2};
 
 use super::{Shape, mesh::place};
 use crate::description::declared::{Plugin, string, vector};
 use crate::description::{Properties, Value};
 use crate::error::{Error, Result};
-use crate::mesh::Mesh;
+use crate::mesh::{Mesh, triangulate};
 
 /// The most corners, for every edge is held against every other.
 const MAX_CORNERS: usize = 4096;
@@ -187,47 +186,9 @@ fn meet([a, b]: [DVec2; 2], [c, d]: [DVec2; 2]) -> bool {
     s[0] * s[1] <= 0.0 && t[0] * t[1] <= 0.0
 }
 
-/// Triangles that cover the polygon, all turned as it is; `None` where rounding leaves a gap.
-fn triangulate(corners: &[DVec2]) -> Option<Vec<[u32; 3]>> {
-    let mut indices: Vec<u32> = Vec::new();
-    Earcut::new().earcut(corners.iter().map(|p| p.to_array()), &[], &mut indices);
-    let doubled = |[a, b, c]: [u32; 3]| {
-        let [a, b, c] = [a, b, c].map(|i| corners[i as usize]);
-        (b - a).perp_dot(c - a)
-    };
-    let triangles: Vec<[u32; 3]> = (indices.chunks_exact(3))
-        .map(|t| [t[0], t[1], t[2]])
-        .map(|[a, b, c]| match doubled([a, b, c]) {
-            area if area < 0.0 => [a, c, b],
-            _ => [a, b, c],
-        })
-        .collect();
-    let covered: f64 = triangles.iter().map(|t| doubled(*t)).sum();
-    let whole: f64 = (0..corners.len())
-        .map(|i| corners[i].perp_dot(corners[(i + 1) % corners.len()]))
-        .sum();
-    ((covered - whole).abs() <= 1e-6 * whole.abs()).then_some(triangles)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_polygon_is_covered_once_however_concave_it_is() {
-        for teeth in [3, 10, 300] {
-            // A comb: its teeth stand up from a bar.
-            let mut corners = vec![DVec2::new(f64::from(2 * teeth), -1.0)];
-            for i in (0..teeth).rev() {
-                let x = f64::from(2 * i);
-                corners.extend([(x + 2.0, 0.0), (x + 1.5, 5.0), (x + 1.0, 0.1)].map(DVec2::from));
-            }
-            corners.extend([(0.0, 0.0), (0.0, -1.0)].map(DVec2::from));
-            assert_eq!(crossing(&corners), None);
-            let triangles = triangulate(&corners).expect("it has an area");
-            assert_eq!(triangles.len(), corners.len() - 2);
-        }
-    }
 
     #[test]
     fn segments_meet_where_they_cross_touch_and_overlap() {

@@ -482,3 +482,48 @@ fn surfaces_of_no_extent_are_refused() {
         );
     }
 }
+
+#[test]
+fn flipped_meshes_without_texture_coordinates_have_the_u_and_v_of_unflipped_ones() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("quad.obj");
+    std::fs::write(&path, "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n").unwrap();
+    for flip in [false, true] {
+        let quad = geometry(&format!(
+            r#"<shape type="obj"><string name="filename" value="{}"/><boolean name="flip_normals" value="{flip}"/></shape>"#,
+            path.display()
+        ));
+        let Geometry::Mesh(mesh) = &quad else {
+            panic!("an obj is a mesh")
+        };
+        // As Mitsuba 3.9.1 gives them: the place, uv, dp_du and dp_dv.
+        for (primitive, place, uv, dp_du, dp_dv) in [
+            (0, (0.7, 0.2), (0.5, 0.2), (1.0, 0.0), (1.0, 1.0)),
+            (1, (0.2, 0.7), (0.2, 0.5), (1.0, 1.0), (0.0, 1.0)),
+        ] {
+            let place = Vec2::from(place);
+            let [a, b, c] = mesh.corners(primitive).map(Vec3::truncate);
+            let whole = (b - a).perp_dot(c - a);
+            let hit = Hit {
+                t: 5.0,
+                u: (place - a).perp_dot(c - a) / whole,
+                v: (b - a).perp_dot(place - a) / whole,
+                shape: 0,
+                primitive,
+                instance: Hit::NONE,
+            };
+            let from = ray(place.extend(5.0), place.extend(0.0));
+            let at = quad.interaction(&from, &hit);
+            let is = |found: Vec2, wanted: (f32, f32)| {
+                assert!(
+                    found.distance(wanted.into()) < 1e-6,
+                    "{flip}: {found} for {wanted:?}"
+                );
+            };
+            is(at.uv, uv);
+            is(at.dp_du.truncate(), dp_du);
+            is(at.dp_dv.truncate(), dp_dv);
+            assert_eq!(at.normal, if flip { Vec3::NEG_Z } else { Vec3::Z });
+        }
+    }
+}

@@ -96,7 +96,7 @@ pub fn read_gltf(path: &Path, options: &ReadOptions) -> Result<GltfScene> {
             warnings,
         } = Decoded {
             mesh: part.mesh,
-            warnings: Vec::new(),
+            ..Decoded::default()
         }
         .finish(path);
         scene.dropped_triangles += dropped_triangles;
@@ -127,6 +127,7 @@ pub(super) fn read(input: Input<'_>, options: &ReadOptions) -> Result<Decoded> {
     Ok(Decoded {
         mesh,
         warnings: walk.warnings,
+        ..Decoded::default()
     })
 }
 

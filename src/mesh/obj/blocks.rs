@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use super::piece::{Counts, Piece, counts};
 use crate::error::{Error, Location, Result};
+use crate::file::text;
 use crate::mesh::read::Input;
 
 /// How a file is cut.
@@ -31,8 +32,8 @@ const JOINED: u8 = b'\x0c';
 pub(super) struct Blocks<'a> {
     input: Input<'a>,
     cuts: Cuts,
-    /// What was read and has no line end yet.
-    rest: Vec<u8>,
+    /// What was read and has no line end yet; `None` before anything was.
+    rest: Option<Vec<u8>>,
     /// What stands before the next block.
     before: Counts,
     /// Lines before the next block.
@@ -51,7 +52,7 @@ impl<'a> Blocks<'a> {
         Self {
             input,
             cuts,
-            rest: Vec::new(),
+            rest: None,
             before: Counts::default(),
             lines: 0,
         }
@@ -76,9 +77,10 @@ impl<'a> Blocks<'a> {
             before
         });
         let befores: Vec<Counts> = befores.collect();
+        let origin = self.input.origin;
         let pieces = lines.par_iter().zip(befores);
         let mut pieces: Vec<Piece> = pieces
-            .map(|(lines, before)| Piece::read(lines, before))
+            .map(|(lines, before)| Piece::read(lines, before, origin))
             .collect();
         let ends = |bytes: &[u8]| bytes.iter().filter(|&&b| b == b'\n' || b == JOINED).count();
         let mut wrong = None;
@@ -97,28 +99,48 @@ impl<'a> Blocks<'a> {
 
     /// Whole lines, about a block of them.
     fn bytes(&mut self) -> Result<Option<Vec<u8>>> {
-        let mut bytes = std::mem::take(&mut self.rest);
+        let mut bytes = match self.rest.take() {
+            Some(rest) => rest,
+            None => self.beginning()?,
+        };
         bytes.reserve_exact(self.cuts.block.min(self.input.length as usize));
-        let mut searched = 0;
+        let mut searched: usize = 0;
         loop {
-            let more = (self.cuts.block as u64).min(self.input.length);
-            let read = self.input.reader.take(more).read_to_end(&mut bytes);
-            let read = read.map_err(|e| Error::system("read", self.input.path, &e))? as u64;
-            // A file that has shrunk meanwhile ends where it ends now.
-            self.input.length = if read < more {
-                0
-            } else {
-                self.input.length - read
-            };
+            self.append(self.cuts.block, &mut bytes)?;
+            // With the byte before, which may be a CR.
+            let new = &mut bytes[searched.saturating_sub(1)..];
+            text::end_lines_in_feeds(new, self.input.length == 0);
             if self.input.length == 0 {
+                self.rest = Some(Vec::new());
                 return Ok((!bytes.is_empty()).then_some(bytes));
             }
             if let Some(end) = last_line_end(&bytes, searched) {
-                self.rest = bytes.split_off(end);
+                self.rest = Some(bytes.split_off(end));
                 return Ok(Some(bytes));
             }
             searched = bytes.len();
         }
+    }
+
+    /// What stands before the first block, but for a byte-order mark.
+    fn beginning(&mut self) -> Result<Vec<u8>> {
+        let mut bytes = Vec::new();
+        self.append(text::BYTE_ORDER_MARK.len(), &mut bytes)?;
+        Ok(text::without_mark(&bytes).to_vec())
+    }
+
+    /// Appends `most` bytes of the file, or those that there are.
+    fn append(&mut self, most: usize, bytes: &mut Vec<u8>) -> Result<()> {
+        let more = (most as u64).min(self.input.length);
+        let read = self.input.reader.take(more).read_to_end(bytes);
+        let read = read.map_err(|e| Error::system("read", self.input.path, &e))? as u64;
+        // A file that has shrunk meanwhile ends where it ends now.
+        self.input.length = if read < more {
+            0
+        } else {
+            self.input.length - read
+        };
+        Ok(())
     }
 
     /// `bytes` in pieces that end where lines end.

@@ -3,7 +3,7 @@
 //! it to compare). Corners `v/vt/vn` that are equal share a vertex; vertices stand in the order in which
 //! faces first name them. Polygons are fans around their first corner; negative indices count back from
 //! the last; lines that are neither `v`, `vt`, `vn` nor `f` are passed over, but for those that name
-//! materials where they are asked for.
+//! materials where they are asked for. Colours behind a vertex's place, `v x y z r g b`, are those of a bare mesh.
 
 mod blocks;
 mod piece;
@@ -13,12 +13,14 @@ use std::path::Path;
 
 use glam::{Vec2, Vec3};
 
+use super::colors;
 use super::mtl::{BARE_COLOR, Materials};
+use super::polygon::Polygons;
 use super::read::{Decoded, Input, ReadOptions};
 use super::{Attribute, Mesh, Per};
 use crate::error::{Error, Location, Result};
 use blocks::{Block, Blocks, CUTS, Cuts};
-use piece::{NONE, OfLine, Piece, new_index, shown};
+use piece::{LeftOut, NO_COLOR, NONE, OfLine, Piece, new_index, shown};
 
 pub(super) fn read(input: Input<'_>, options: &ReadOptions) -> Result<Decoded> {
     read_in(CUTS, input, options)
@@ -30,7 +32,10 @@ fn read_in(cuts: Cuts, input: Input<'_>, options: &ReadOptions) -> Result<Decode
     let path = input.path;
     let length = input.length;
     let mut blocks = Blocks::new(input, cuts);
-    let mut obj = Obj::default();
+    let mut obj = Obj {
+        polygons: Polygons::new(options.bare),
+        ..Obj::default()
+    };
     let mut next = blocks.next()?;
     while let Some(Block { pieces, wrong }) = next {
         let (taken, read) = rayon::join(|| obj.take_all(pieces), || blocks.next());
@@ -41,7 +46,8 @@ fn read_in(cuts: Cuts, input: Input<'_>, options: &ReadOptions) -> Result<Decode
         next = read?;
     }
     check_text(length, &obj, path)?;
-    let colors = options.materials.then(|| obj.face_colors(path));
+    let materials = options.materials || options.bare;
+    let colors = materials.then(|| obj.face_colors(path));
     let mut decoded = obj.finish(options);
     if let Some(FaceColors {
         attribute,
@@ -72,6 +78,8 @@ fn check_text(length: u64, obj: &Obj, path: &Path) -> Result<()> {
 #[derive(Default)]
 struct Obj {
     positions: Vec<Vec3>,
+    /// Of the first positions, as in a [`Piece`].
+    colors: Vec<Vec3>,
     uvs: Vec<Vec2>,
     normals: Vec<Vec3>,
     /// Of each vertex of the mesh: position, uv and normal, `NONE` where it has none.
@@ -81,6 +89,8 @@ struct Obj {
     /// The other vertices.
     others: HashMap<[u32; 3], u32>,
     triangles: Vec<[u32; 3]>,
+    polygons: Polygons,
+    left_out: LeftOut,
     /// Faces of fewer than three corners.
     degenerate: usize,
     /// What the `mtllib` lines name.
@@ -110,6 +120,11 @@ impl Obj {
 
     /// Appends what stands in a piece.
     fn take(&mut self, mut piece: Piece) -> OfLine<()> {
+        if !piece.colors.is_empty() {
+            self.colors.resize(self.positions.len(), NO_COLOR);
+            self.colors.append(&mut piece.colors);
+        }
+        self.left_out.add(piece.left_out);
         self.positions.append(&mut piece.positions);
         self.uvs.append(&mut piece.uvs);
         self.normals.append(&mut piece.normals);
@@ -122,6 +137,7 @@ impl Obj {
                 self.use_material(name);
             }
             let count = count as usize;
+            self.polygons.push(self.triangles.len(), count);
             self.face(corners.by_ref().take(count))?;
             self.degenerate += usize::from(count < 3);
         }
@@ -199,8 +215,23 @@ impl Obj {
         }
     }
 
+    /// The attribute `vertex_color`: the colours behind the vertices' places.
+    fn vertex_color(&self) -> Attribute {
+        let color = |v: &[u32; 3]| {
+            let color = self.colors.get(v[0] as usize).filter(|c| c.is_finite());
+            color.map_or(BARE_COLOR, |c| c.to_array())
+        };
+        Attribute {
+            name: "vertex_color".to_owned(),
+            channels: 3,
+            per: Per::Vertex,
+            values: self.vertices.iter().flat_map(color).collect(),
+        }
+    }
+
     fn finish(self, options: &ReadOptions) -> Decoded {
         let any = |part: usize| self.vertices.iter().any(|v| v[part] != NONE);
+        let colored = (!self.colors.is_empty() && options.bare).then(|| self.vertex_color());
         let mut mesh = Mesh {
             positions: self
                 .vertices
@@ -211,6 +242,28 @@ impl Obj {
             ..Mesh::default()
         };
         let mut warnings = Vec::new();
+        match colored {
+            Some(mut color) => {
+                warnings.extend(colors::to_unit(&mut color.values, &[None; 3]));
+                mesh.attributes.push(color);
+            }
+            None if self.colors.is_empty() => {}
+            None => warnings.push(
+                "the colours of vertices (v x y z r g b) are left out, as in Mitsuba".to_owned(),
+            ),
+        }
+        let LeftOut {
+            lines_and_points,
+            free_forms,
+        } = self.left_out;
+        for (count, what) in [
+            (lines_and_points, "lines and points (l, p)"),
+            (free_forms, "curves and free-form surfaces (curv, surf)"),
+        ] {
+            if count > 0 {
+                warnings.push(format!("{count} {what} left out: only faces are read"));
+            }
+        }
         if any(1) {
             let uv = |v: &[u32; 3]| self.uvs.get(v[1] as usize).copied().unwrap_or_default();
             mesh.uvs = self.vertices.iter().map(uv).collect();
@@ -230,12 +283,18 @@ impl Obj {
                 "{n} faces left out: they have fewer than three corners"
             ));
         }
-        Decoded { mesh, warnings }
+        Decoded {
+            mesh,
+            warnings,
+            polygons: self.polygons,
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
+
     use super::*;
     use crate::mesh::read::testing::decode;
 
@@ -349,6 +408,7 @@ mod tests {
                 let input = Input {
                     path: Path::new("cut.obj"),
                     length: text.len() as u64,
+                    origin: DVec3::ZERO,
                     reader: &mut text.as_bytes(),
                 };
                 let decoded = read_in(cuts, input, &ReadOptions::default());

@@ -1,7 +1,7 @@
 //! Some lines of an OBJ file, understood without the others: what is defined in them, and the faces, whose indices
 //! are known from 0 as soon as it is known how much stands before the lines. So pieces are read in parallel.
 
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 
 use crate::mesh::mtl::keyword;
 
@@ -14,12 +14,19 @@ pub(super) const NONE: u32 = u32::MAX;
 /// How many `v`, `vt` and `vn` lines there are.
 pub(super) type Counts = [usize; 3];
 
+/// Of a vertex without a colour.
+pub(super) const NO_COLOR: Vec3 = Vec3::NAN;
+
 /// See the module.
 #[derive(Default)]
 pub(super) struct Piece {
     /// What stands before it.
     before: Counts,
+    /// What is subtracted from positions.
+    origin: DVec3,
     pub(super) positions: Vec<Vec3>,
+    /// Of the first positions, `NO_COLOR` where one has none. Empty: no position has one.
+    pub(super) colors: Vec<Vec3>,
     pub(super) uvs: Vec<Vec2>,
     pub(super) normals: Vec<Vec3>,
     /// Position, uv and normal of the corners of all faces, `NONE` where a corner has none.
@@ -30,8 +37,18 @@ pub(super) struct Piece {
     pub(super) libraries: Vec<Vec<u8>>,
     /// What the `usemtl` lines name, and how many faces stand before them.
     pub(super) uses: Vec<(usize, Vec<u8>)>,
+    pub(super) left_out: LeftOut,
     /// Where a line that is wrong begins, and what is wrong. What follows it was not read.
     pub(super) wrong: Option<(usize, String)>,
+}
+
+/// How many elements there are that make no triangles.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct LeftOut {
+    /// `l` and `p`.
+    pub(super) lines_and_points: usize,
+    /// `curv`, `curv2` and `surf`.
+    pub(super) free_forms: usize,
 }
 
 /// What the lines of a piece define.
@@ -39,9 +56,9 @@ pub(super) fn counts(lines: &[u8]) -> Counts {
     let mut counts = Counts::default();
     for line in lines.split(|&b| b == b'\n') {
         let kind = match line.trim_ascii_start() {
-            [b'v', b, ..] if b.is_ascii_whitespace() => 0,
-            [b'v', b't', b, ..] if b.is_ascii_whitespace() => 1,
-            [b'v', b'n', b, ..] if b.is_ascii_whitespace() => 2,
+            [b'v' | b'V', b, ..] if b.is_ascii_whitespace() => 0,
+            [b'v' | b'V', b't' | b'T', b, ..] if b.is_ascii_whitespace() => 1,
+            [b'v' | b'V', b'n' | b'N', b, ..] if b.is_ascii_whitespace() => 2,
             // Also a bare "v", which is wrong.
             _ => continue,
         };
@@ -51,10 +68,11 @@ pub(super) fn counts(lines: &[u8]) -> Counts {
 }
 
 impl Piece {
-    /// Reads the `lines` that stand behind so many others.
-    pub(super) fn read(lines: &[u8], before: Counts) -> Self {
+    /// Reads the `lines` that stand behind so many others. `origin` is subtracted from positions.
+    pub(super) fn read(lines: &[u8], before: Counts, origin: DVec3) -> Self {
         let mut piece = Self {
             before,
+            origin,
             ..Self::default()
         };
         let mut start = 0;
@@ -77,23 +95,38 @@ impl Piece {
     fn line(&mut self, line: &[u8]) -> OfLine<()> {
         let mut words = Words(line);
         match words.next() {
-            Some(b"v") => {
-                let position = numbers(&mut words, 3)?;
+            Some([b'v' | b'V']) => {
+                let position = if self.origin == DVec3::ZERO {
+                    Vec3::from_array(numbers(&mut words, 3)?)
+                } else {
+                    let position = numbers_by(&mut words, 3, |_| None)?;
+                    (DVec3::from_array(position) - self.origin).as_vec3()
+                };
                 new_index(self.defined()[0])?;
-                self.positions.push(Vec3::from_array(position));
+                if let Some(color) = color(words) {
+                    self.colors.resize(self.positions.len(), NO_COLOR);
+                    self.colors.push(color);
+                }
+                self.positions.push(position);
             }
-            Some(b"vt") => {
+            Some([b'v' | b'V', b't' | b'T']) => {
                 let [u, v, _] = numbers(&mut words, 1)?;
                 self.uvs.push(Vec2::new(u, v));
             }
-            Some(b"vn") => self.normals.push(Vec3::from_array(numbers(&mut words, 3)?)),
-            Some(b"f") => return self.face(words),
-            Some(b"mtllib") => self.libraries.push(keyword(line).1.to_vec()),
-            Some(b"usemtl") => {
+            Some([b'v' | b'V', b'n' | b'N']) => {
+                let normal = numbers(&mut words, 3)?;
+                self.normals.push(Vec3::from_array(normal));
+            }
+            Some([b'f' | b'F']) => return self.face(words),
+            Some(word) if word.eq_ignore_ascii_case(b"mtllib") => {
+                self.libraries.push(keyword(line).1.to_vec())
+            }
+            Some(word) if word.eq_ignore_ascii_case(b"usemtl") => {
                 let name = keyword(line).1.to_vec();
                 self.uses.push((self.faces.len(), name));
             }
-            _ => {}
+            Some(word) => self.left_out.note(word),
+            None => {}
         }
         Ok(())
     }
@@ -110,7 +143,25 @@ impl Piece {
     }
 }
 
+impl LeftOut {
+    /// Notes a line that begins with `word`, if it is an element.
+    fn note(&mut self, word: &[u8]) {
+        let is = |names: &[&str]| {
+            let mut names = names.iter();
+            names.any(|name| word.eq_ignore_ascii_case(name.as_bytes()))
+        };
+        self.lines_and_points += usize::from(is(&["l", "p"]));
+        self.free_forms += usize::from(is(&["curv", "curv2", "surf"]));
+    }
+
+    pub(super) fn add(&mut self, other: Self) {
+        self.lines_and_points += other.lines_and_points;
+        self.free_forms += other.free_forms;
+    }
+}
+
 /// The words of a line, none of them empty.
+#[derive(Clone)]
 struct Words<'a>(&'a [u8]);
 
 impl<'a> Iterator for Words<'a> {
@@ -131,13 +182,37 @@ pub(super) fn new_index(count: usize) -> OfLine<u32> {
     index.ok_or_else(|| "there are more vertices than 32-bit indices reach".to_owned())
 }
 
+/// The colour that three or four numbers after a position say; a single one is a weight.
+fn color(words: Words<'_>) -> Option<Vec3> {
+    if words.0.is_empty() {
+        return None;
+    }
+    let numbers = words.take_while(|w| w[0] != b'#').map(parse::<f32>);
+    let numbers: Vec<Option<f32>> = numbers.take(5).collect();
+    match numbers[..] {
+        [Some(r), Some(g), Some(b)] | [Some(r), Some(g), Some(b), Some(_)] => {
+            Some(Vec3::new(r, g, b)).filter(|color| color.is_finite())
+        }
+        _ => None,
+    }
+}
+
 /// The first three of `words` as numbers, of which `least` must be there.
 fn numbers(words: &mut Words<'_>, least: usize) -> OfLine<[f32; 3]> {
-    let mut numbers = [0.0; 3];
+    numbers_by(words, least, decimal)
+}
+
+/// The same, where `quick` knows the more common ones.
+fn numbers_by<T: Copy + Default + std::str::FromStr>(
+    words: &mut Words<'_>,
+    least: usize,
+    quick: impl Fn(&[u8]) -> Option<T>,
+) -> OfLine<[T; 3]> {
+    let mut numbers = [T::default(); 3];
     for (i, number) in numbers.iter_mut().enumerate() {
         match words.next().filter(|w| w[0] != b'#') {
             Some(word) => {
-                *number = decimal(word)
+                *number = quick(word)
                     .or_else(|| parse(word))
                     .ok_or_else(|| format!("a number is wanted, not {}", shown(word)))?
             }
@@ -217,6 +292,9 @@ fn index(part: &[u8], count: usize, kind: &str, word: &[u8]) -> OfLine<u32> {
 
 /// A number of a few digits and nothing else.
 fn whole(part: &[u8]) -> Option<i64> {
+    if !(1..=18).contains(&part.len()) {
+        return None;
+    }
     let mut value = 0;
     for b in part {
         match b {
@@ -224,7 +302,7 @@ fn whole(part: &[u8]) -> Option<i64> {
             _ => return None,
         }
     }
-    (1..=18).contains(&part.len()).then_some(value)
+    Some(value)
 }
 
 fn malformed(word: &[u8]) -> String {

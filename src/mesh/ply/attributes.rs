@@ -3,32 +3,55 @@
 //! face: `face_color`). Of the others, neighbours `p_0 p_1 p_2` (counted from 0 or 1) or `p_x p_y p_z` make
 //! `vertex_p`; `p_r p_g p_b` make `vertex_p_color`; a single `p_0` makes an attribute of one channel, and
 //! two or more than three are refused with a warning. Numbers are taken as they stand: bytes are not
-//! divided by 255.
+//! divided by 255. In a bare mesh the colours are divided by the greatest number of their type, and may be called
+//! `diffuse_red` and so on.
 
 use super::header::{Element, Kind};
 
 /// An attribute to read from an element's rows.
-#[derive(Debug, PartialEq, Eq)]
+#[derive(Debug, PartialEq)]
 pub(super) struct Plan {
     /// With its prefix.
     pub(super) name: String,
     /// The properties of the element that are its channels.
     pub(super) properties: Vec<usize>,
+    /// The greatest number of each channel's type, `None` for floats, where it is a colour to be divided by it.
+    pub(super) ranges: Option<Vec<Option<f32>>>,
 }
 
-/// The attributes of `element`, but for the properties in `taken`; `prefix` is `vertex_` or `face_`.
+/// Which attributes are wanted.
+pub(super) struct Wanted<'a> {
+    /// `vertex_` or `face_`.
+    pub(super) prefix: &'a str,
+    /// Properties that are something else.
+    pub(super) taken: &'a [usize],
+    /// Whether they are those of a bare mesh.
+    pub(super) bare: bool,
+}
+
+/// The attributes of `element`.
 pub(super) fn plan(
     element: &Element,
-    prefix: &str,
-    taken: &[usize],
+    wanted: &Wanted<'_>,
     warnings: &mut Vec<String>,
 ) -> Vec<Plan> {
+    let Wanted {
+        prefix,
+        taken,
+        bare,
+    } = *wanted;
     let mut plans = Vec::new();
     let mut taken = taken.to_vec();
-    if let Some(properties) = color(element) {
+    if let Some(properties) = color(element, bare) {
         taken.extend(&properties);
-        let integers = |&i: &usize| matches!(element.properties[i].kind, Kind::Scalar(scalar) if scalar.is_integer());
-        if properties.iter().any(integers) {
+        let ranges = properties
+            .iter()
+            .map(|&i| match element.properties[i].kind {
+                Kind::Scalar(scalar) => scalar.greatest(),
+                Kind::List { .. } => None,
+            });
+        let ranges: Vec<Option<f32>> = ranges.collect();
+        if !bare && ranges.iter().any(Option::is_some) {
             warnings.push(format!(
                 "attribute \"{prefix}color\" is stored in whole numbers and taken as they stand, as Mitsuba does; \
                  store colors as floats in [0, 1]"
@@ -37,6 +60,7 @@ pub(super) fn plan(
         plans.push(Plan {
             name: format!("{prefix}color"),
             properties,
+            ranges: bare.then_some(ranges),
         });
     }
     for group in groups(element, &taken) {
@@ -44,6 +68,7 @@ pub(super) fn plan(
             Ok(name) => plans.push(Plan {
                 name: format!("{prefix}{name}"),
                 properties: group.properties,
+                ranges: None,
             }),
             Err(why) => warnings.push(format!(
                 "attribute \"{prefix}{}\" left out: {why}",
@@ -67,16 +92,25 @@ pub(super) fn plan(
     plans
 }
 
-fn color(element: &Element) -> Option<Vec<usize>> {
-    [["r", "g", "b", "a"], ["red", "green", "blue", "alpha"]]
-        .iter()
-        .find_map(|names| {
-            let channels = names.map(|name| element.scalar(&[name]));
-            let [Some(r), Some(g), Some(b), a] = channels else {
-                return None;
-            };
-            Some([r, g, b].into_iter().chain(a).collect())
-        })
+fn color(element: &Element, bare: bool) -> Option<Vec<usize>> {
+    const NAMES: [[&str; 4]; 3] = [
+        ["r", "g", "b", "a"],
+        ["red", "green", "blue", "alpha"],
+        [
+            "diffuse_red",
+            "diffuse_green",
+            "diffuse_blue",
+            "diffuse_alpha",
+        ],
+    ];
+    let names = if bare { &NAMES[..] } else { &NAMES[..2] };
+    names.iter().find_map(|names| {
+        let channels = names.map(|name| element.scalar(name));
+        let [Some(r), Some(g), Some(b), a] = channels else {
+            return None;
+        };
+        Some([r, g, b].into_iter().chain(a).collect())
+    })
 }
 
 /// Neighbouring properties of one stem.
@@ -160,7 +194,12 @@ mod tests {
             properties,
         };
         let mut warnings = Vec::new();
-        let plans = plan(&element, "vertex_", &[], &mut warnings);
+        let wanted = Wanted {
+            prefix: "vertex_",
+            taken: &[],
+            bare: false,
+        };
+        let plans = plan(&element, &wanted, &mut warnings);
         let shown = plans.iter().map(|p| {
             let names = p
                 .properties

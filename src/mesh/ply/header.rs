@@ -26,7 +26,7 @@ pub(super) enum Scalar {
 
 impl Scalar {
     fn from_name(name: &str) -> Option<Self> {
-        Some(match name {
+        Some(match name.to_ascii_lowercase().as_str() {
             "char" | "int8" => Self::I8,
             "uchar" | "uint8" => Self::U8,
             "short" | "int16" => Self::I16,
@@ -50,7 +50,20 @@ impl Scalar {
     }
 
     pub(super) fn is_integer(self) -> bool {
-        !matches!(self, Self::F32 | Self::F64)
+        self.greatest().is_some()
+    }
+
+    /// The greatest number of a type of whole numbers.
+    pub(super) fn greatest(self) -> Option<f32> {
+        Some(match self {
+            Self::I8 => i8::MAX.into(),
+            Self::U8 => u8::MAX.into(),
+            Self::I16 => i16::MAX.into(),
+            Self::U16 => u16::MAX.into(),
+            Self::I32 => i32::MAX as f32,
+            Self::U32 => u32::MAX as f32,
+            Self::F32 | Self::F64 => return None,
+        })
     }
 
     /// The number in the first bytes of `bytes`, exactly.
@@ -124,11 +137,14 @@ impl Element {
         self.properties.iter().map(size).sum()
     }
 
-    /// The place of the scalar property that has one of `names`.
-    pub(super) fn scalar(&self, names: &[&str]) -> Option<usize> {
-        let is =
-            |p: &Property| matches!(p.kind, Kind::Scalar(_)) && names.contains(&p.name.as_str());
-        self.properties.iter().position(is)
+    /// The place of the scalar property `name`, or of the first that is called so but for upper and lower case.
+    pub(super) fn scalar(&self, name: &str) -> Option<usize> {
+        let find = |is: fn(&str, &str) -> bool| {
+            self.properties
+                .iter()
+                .position(|p| matches!(p.kind, Kind::Scalar(_)) && is(&p.name, name))
+        };
+        find(|a, b| a == b).or_else(|| find(str::eq_ignore_ascii_case))
     }
 }
 
@@ -136,22 +152,33 @@ impl Element {
 pub(super) struct Header {
     pub(super) encoding: Encoding,
     pub(super) elements: Vec<Element>,
+    /// The pictures that comments name, as MeshLab writes them.
+    pub(super) pictures: Vec<String>,
 }
+
+/// The elements that make a mesh.
+pub(super) const WANTED: [&str; 2] = ["vertex", "face"];
 
 impl Header {
     pub(super) fn read(source: &mut Source<'_>) -> Result<Self> {
-        if source.peek(4)?.first_chunk() != Some(b"ply\n")
-            && source.line().ok().as_deref() != Some("ply")
-        {
+        source.skip_mark()?;
+        let first = source.line();
+        if !first.is_ok_and(|line| line.trim_end().eq_ignore_ascii_case("ply")) {
             return Err(source
                 .error_at_last_line("a PLY file begins with a line \"ply\"; this one does not"));
         }
         let mut encoding = None;
         let mut elements: Vec<Element> = Vec::new();
+        let mut pictures = Vec::new();
         loop {
             let line = source.line()?;
-            let words: Vec<&str> = line.split_ascii_whitespace().collect();
+            let mut words: Vec<&str> = line.split_ascii_whitespace().collect();
+            let keyword = words.first().map(|word| word.to_ascii_lowercase());
+            if let (Some(word), Some(keyword)) = (words.first_mut(), &keyword) {
+                *word = keyword;
+            }
             match words[..] {
+                ["comment", "TextureFile", ..] => pictures.push(words[2..].join(" ")),
                 [] | ["ply"] | ["comment" | "obj_info", ..] => {}
                 ["format", name, "1.0"] => encoding = encoding_of(name),
                 ["element", name, count] => {
@@ -160,6 +187,10 @@ impl Header {
                             "an element needs a count from 0 on, not {count:?}"
                         ))
                     })?;
+                    let name = WANTED
+                        .into_iter()
+                        .find(|wanted| name.eq_ignore_ascii_case(wanted))
+                        .unwrap_or(name);
                     if elements.iter().any(|e| e.name == name) {
                         let message = format!("element {name:?} stands twice in the header");
                         return Err(source.error_at_last_line(message));
@@ -195,12 +226,16 @@ impl Header {
                 "wanted is \"format\", then ascii, binary_little_endian or binary_big_endian, then 1.0",
             )
         })?;
-        Ok(Self { encoding, elements })
+        Ok(Self {
+            encoding,
+            elements,
+            pictures,
+        })
     }
 }
 
 fn encoding_of(name: &str) -> Option<Encoding> {
-    Some(match name {
+    Some(match name.to_ascii_lowercase().as_str() {
         "ascii" => Encoding::Ascii,
         "binary_little_endian" => Encoding::LittleEndian,
         "binary_big_endian" => Encoding::BigEndian,
@@ -210,7 +245,7 @@ fn encoding_of(name: &str) -> Option<Encoding> {
 
 fn property(words: &[&str]) -> Option<Property> {
     let (kind, name) = match *words {
-        ["list", count, item, name] => {
+        [list, count, item, name] if list.eq_ignore_ascii_case("list") => {
             let count = Scalar::from_name(count).filter(|c| c.is_integer())?;
             (
                 Kind::List {

@@ -8,14 +8,15 @@ mod header;
 mod rows;
 mod write;
 
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
+use super::polygon::Polygons;
 use super::read::{Decoded, Input, ReadOptions};
 use super::source::Source;
-use super::{Attribute, GRAIN, Mesh, Per};
+use super::{Attribute, GRAIN, Mesh, Per, colors};
 use crate::error::Result;
-use attributes::Plan;
+use attributes::{Plan, Wanted};
 use header::{Element, Encoding, Header, Kind, Scalar};
 use rows::{Column, Rows};
 
@@ -27,9 +28,10 @@ const ROWS: u64 = 1 << 10;
 const BLOCK: usize = 1 << 22;
 
 pub(super) fn read(input: Input<'_>, options: &ReadOptions) -> Result<Decoded> {
+    let origin = input.origin;
     let mut source = Source::new(input);
     let header = Header::read(&mut source)?;
-    for wanted in ["vertex", "face"] {
+    for wanted in header::WANTED {
         if !header.elements.iter().any(|e| e.name == wanted) {
             return Err(source
                 .error_at_last_line(format!("the file has no element {wanted:?}"))
@@ -43,8 +45,14 @@ pub(super) fn read(input: Input<'_>, options: &ReadOptions) -> Result<Decoded> {
         source,
         encoding: header.encoding,
         vertices: 0,
-        decoded: Decoded::default(),
+        bare: options.bare,
+        origin,
+        decoded: Decoded {
+            polygons: Polygons::new(options.bare),
+            ..Decoded::default()
+        },
     };
+    ply.say_what_is_left_out(&header);
     for element in &header.elements {
         ply.check_length(element)?;
         if element.name == "vertex" {
@@ -78,10 +86,43 @@ struct Ply<'a> {
     encoding: Encoding,
     /// As the header promises them.
     vertices: u64,
+    /// Whether the file is all there is.
+    bare: bool,
+    /// What is subtracted from positions.
+    origin: DVec3,
     decoded: Decoded,
 }
 
 impl Ply<'_> {
+    fn say_what_is_left_out(&mut self, header: &Header) {
+        let warnings = &mut self.decoded.warnings;
+        for element in &header.elements {
+            let Element { name, count, .. } = element;
+            if *count == 0 {
+                continue;
+            }
+            if !header::WANTED.contains(&name.as_str()) {
+                warnings.push(format!(
+                    "{count} rows of element {name:?} left out: only vertices and faces are read"
+                ));
+                continue;
+            }
+            let lists = element.properties.iter().filter(|property| {
+                matches!(property.kind, Kind::List { .. })
+                    && !(name == "face" && is_corners(property))
+            });
+            warnings.extend(lists.map(|list| match list.name.as_str() {
+                "texcoord" => format!(
+                    "list \"texcoord\" of element {name:?} left out: texture coordinates are those of vertices, s and t"
+                ),
+                list => format!("list {list:?} of element {name:?} left out"),
+            }));
+        }
+        if let (true, Some(picture)) = (self.bare, header.pictures.first()) {
+            warnings.push(format!("the picture {picture:?} is not shown"));
+        }
+    }
+
     /// Refuses a count of rows that the rest of the file cannot hold.
     fn check_length(&self, element: &Element) -> Result<()> {
         let Element { name, count, .. } = element;
@@ -105,21 +146,28 @@ impl Ply<'_> {
     }
 
     fn read_vertices(&mut self, element: &Element) -> Result<()> {
-        let find = |names: &[&[&str]]| -> Option<Vec<usize>> {
-            names.iter().map(|names| element.scalar(names)).collect()
+        let find = |names: &[&str]| -> Option<Vec<usize>> {
+            names.iter().map(|name| element.scalar(name)).collect()
         };
-        let Some(position) = find(&[&["x"], &["y"], &["z"]]) else {
+        let Some(position) = find(&["x", "y", "z"]) else {
             return Err(self
                 .source
                 .error("element \"vertex\" needs the properties x, y and z"));
         };
-        let normal = find(&[&["nx"], &["ny"], &["nz"]]);
-        let uv = find(&[&["u"], &["v"]])
-            .or_else(|| find(&[&["s"], &["t"]]))
-            .or_else(|| find(&[&["texture_u"], &["texture_v"]]));
+        let normal = find(&["nx", "ny", "nz"]);
+        let uv = find(&["u", "v"])
+            .or_else(|| find(&["s", "t"]))
+            .or_else(|| find(&["texture_u", "texture_v"]));
         let named = [Some(&position), normal.as_ref(), uv.as_ref()];
         let taken: Vec<usize> = named.into_iter().flatten().flatten().copied().collect();
-        let plans = attributes::plan(element, "vertex_", &taken, &mut self.decoded.warnings);
+        let wanted = Wanted {
+            prefix: "vertex_",
+            taken: &taken,
+            bare: self.bare,
+        };
+        let plans = attributes::plan(element, &wanted, &mut self.decoded.warnings);
+        let ranges: Vec<_> = plans.iter().map(|p| p.ranges.clone()).collect();
+        let origin = self.origin;
 
         let (stride, columns) = self.columns(element);
         let place = |properties: &[usize]| -> Vec<Column> {
@@ -139,7 +187,11 @@ impl Ply<'_> {
         mesh.normals.reserve_exact(normal.map_or(0, |_| count));
         mesh.uvs.reserve_exact(uv.map_or(0, |_| count));
         self.each_rows(element, stride, |rows| {
-            rows.get(position, &mut mesh.positions, Vec3::from_array);
+            if origin == DVec3::ZERO {
+                rows.get(position, &mut mesh.positions, Vec3::from_array);
+            } else {
+                rows.get_from(origin, position, &mut mesh.positions);
+            }
             if let Some(normal) = normal {
                 rows.get(normal, &mut mesh.normals, Vec3::from_array);
             }
@@ -150,10 +202,21 @@ impl Ply<'_> {
                 rows.get_all(columns, &mut attribute.values);
             }
         })?;
+        self.divide_colors(&mut mesh.attributes, &ranges);
         mesh.triangles = std::mem::take(&mut self.decoded.mesh.triangles);
         mesh.attributes.append(&mut self.decoded.mesh.attributes);
         self.decoded.mesh = mesh;
         Ok(())
+    }
+
+    /// Divides those of the attributes that have ranges.
+    fn divide_colors(&mut self, attributes: &mut [Attribute], ranges: &[Option<Vec<Option<f32>>>]) {
+        for (attribute, ranges) in attributes.iter_mut().zip(ranges) {
+            if let Some(ranges) = ranges {
+                let assumed = colors::to_unit(&mut attribute.values, ranges);
+                self.decoded.warnings.extend(assumed);
+            }
+        }
     }
 
     /// The row's length and each property's place in it, in what [`Ply::each_rows`] gives.
@@ -220,8 +283,6 @@ impl Ply<'_> {
     }
 
     fn read_faces(&mut self, element: &Element) -> Result<()> {
-        let is_corners =
-            |p: &header::Property| ["vertex_indices", "vertex_index"].contains(&p.name.as_str());
         let Some(corners) = element.properties.iter().position(is_corners) else {
             return Err(self
                 .source
@@ -236,7 +297,13 @@ impl Ply<'_> {
                 .source
                 .error("the corners of a face must be whole numbers"));
         }
-        let plans = attributes::plan(element, "face_", &[], &mut self.decoded.warnings);
+        let wanted = Wanted {
+            prefix: "face_",
+            taken: &[],
+            bare: self.bare,
+        };
+        let plans = attributes::plan(element, &wanted, &mut self.decoded.warnings);
+        let ranges: Vec<_> = plans.iter().map(|p| p.ranges.clone()).collect();
         let sources: Vec<Vec<usize>> = plans.iter().map(|p| p.properties.clone()).collect();
         // A face of three corners takes so many bytes; fans only grow beyond it.
         let triangle = element.least_row(self.encoding)
@@ -277,6 +344,8 @@ impl Ply<'_> {
                 return Err(self.out_of_range(face, wrong));
             }
             degenerate += u64::from(polygon.len() < 3);
+            let polygons = &mut self.decoded.polygons;
+            polygons.push(triangles.len(), polygon.len());
             // In range of `vertices`, which fits into 32 bits.
             let at = |i: usize| polygon[i] as u32;
             for i in 2..polygon.len() {
@@ -294,6 +363,7 @@ impl Ply<'_> {
                 format!("{degenerate} faces left out: they have fewer than three corners");
             self.decoded.warnings.push(warning);
         }
+        self.divide_colors(&mut attributes, &ranges);
         self.decoded.mesh.triangles = triangles;
         self.decoded.mesh.attributes.append(&mut attributes);
         Ok(())
@@ -460,6 +530,12 @@ impl Ply<'_> {
             "face {face}: vertex index {index} is out of range; the file {range}"
         ))
     }
+}
+
+/// Whether a list is that of a face's corners.
+fn is_corners(property: &header::Property) -> bool {
+    let mut names = ["vertex_indices", "vertex_index"].into_iter();
+    names.any(|name| property.name.eq_ignore_ascii_case(name))
 }
 
 /// Attributes that have no values yet.

@@ -1,5 +1,6 @@
 //! Rows of a fixed number of bytes, of which columns are decoded into arrays in parallel.
 
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::header::{Encoding, Scalar};
@@ -43,6 +44,15 @@ impl Rows<'_> {
         } else {
             into.par_extend(rows.map(|row| make(columns.map(|c| self.value(c, row)))));
         }
+    }
+
+    /// Appends each row's position, with `origin` subtracted in double precision.
+    pub(super) fn get_from(&self, origin: DVec3, columns: [Column; 3], into: &mut Vec<Vec3>) {
+        let rows = self.bytes.par_chunks_exact(self.stride);
+        into.par_extend(rows.with_min_len(GRAIN).map(|row| {
+            let place = columns.map(|c| c.scalar.decode(&row[c.offset..], self.encoding));
+            (DVec3::from_array(place) - origin).as_vec3()
+        }));
     }
 
     /// Appends each row's `columns`, however many.

@@ -1,5 +1,5 @@
-//! A mesh as a binary little-endian PLY file that Étendue and Mitsuba 3 read alike: `x y z`, `nx ny nz` and `u v` as far
-//! as the mesh has them, attributes under the names that [`attributes`](super::attributes) gives back, and faces of a
+//! A mesh as a binary little-endian PLY file that Étendue and Mitsuba 3 read alike: `x y z`, `nx ny nz` and `s t` (which
+//! more programs know as texture coordinates than `u v`) as far as the mesh has them, attributes under the names that [`attributes`](super::attributes) gives back, and faces of a
 //! byte and three indices. Rows are made some at a time, so that the mesh is in memory once.
 
 use std::io::{self, Write};
@@ -88,7 +88,7 @@ fn header(mesh: &Mesh) -> String {
         names.extend(["nx", "ny", "nz"]);
     }
     if !mesh.uvs.is_empty() {
-        names.extend(["u", "v"]);
+        names.extend(["s", "t"]);
     }
     let mut names: Vec<String> = names.into_iter().map(str::to_owned).collect();
     names.extend(rows(mesh, Per::Vertex).into_iter().flat_map(channels));

@@ -14,9 +14,11 @@ fuzz_target!(|bytes: &[u8]| {
     let folder = tempfile::tempdir().expect("the temporary folder can be written");
     let path = folder.path().join("fuzz").with_extension(extension);
     fs::write(&path, content).expect("the temporary folder can be written");
-    if let Ok(loaded) = read(&path, &ReadOptions::default()) {
-        let vertices = loaded.mesh.positions.len();
-        assert!(loaded.mesh.triangles.iter().flatten().all(|&i| (i as usize) < vertices));
-        loaded.mesh.bounds();
+    for options in [ReadOptions::default(), ReadOptions::BARE] {
+        if let Ok(loaded) = read(&path, &options) {
+            let vertices = loaded.mesh.positions.len();
+            assert!(loaded.mesh.triangles.iter().flatten().all(|&i| (i as usize) < vertices));
+            loaded.mesh.bounds();
+        }
     }
 });
