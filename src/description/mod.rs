@@ -10,6 +10,7 @@ mod canonical;
 mod defines;
 mod element;
 mod encoding;
+mod legacy;
 mod overrides;
 mod reader;
 mod report;

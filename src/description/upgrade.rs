@@ -16,6 +16,8 @@ pub(super) struct Version([u32; 3]);
 impl Version {
     /// The first that spells names as they are spelt now.
     pub(super) const CURRENT_NAMES: Self = Self([2, 0, 0]);
+    /// Mitsuba 3.
+    pub(super) const CURRENT: Self = Self([3, 0, 0]);
 }
 
 impl FromStr for Version {

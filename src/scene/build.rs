@@ -16,6 +16,9 @@ use crate::material::Material;
 use crate::shape::{self, Geometry};
 use crate::texture::Palettes;
 
+/// The light that stands on a shape.
+const AREA: &str = "area";
+
 /// What is made while a scene is built.
 struct Builder<'d, C: ColorModel> {
     description: &'d Description,
@@ -26,6 +29,8 @@ struct Builder<'d, C: ColorModel> {
     lights: Vec<Light<C>>,
     /// By light: its `sampling_weight`.
     weights: Vec<f64>,
+    /// The lights that stand on shapes, by node.
+    worn: HashSet<NodeId>,
     ambients: Vec<Light<C>>,
     problems: Problems,
 }
@@ -118,7 +123,7 @@ impl<C: ColorModel> Builder<'_, C> {
         // What is not known is for the lights' family to name.
         let known = |emitter: &Properties<'_>| Light::<C>::NAMES.contains(&emitter.plugin());
         let light = match &emitter {
-            Some(emitter) if emitter.plugin() != "area" && known(emitter) => {
+            Some(emitter) if emitter.plugin() != AREA && known(emitter) => {
                 let error = Error::input(format!(
                     "emitter \"{}\" cannot stand on a shape",
                     emitter.plugin()
@@ -139,7 +144,10 @@ impl<C: ColorModel> Builder<'_, C> {
                 );
                 None
             }
-            Some(emitter) => self.light(emitter, Some(geometry)),
+            Some(emitter) => {
+                self.worn.insert(emitter.node_id());
+                self.light(emitter, Some(geometry))
+            }
             None => None,
         };
         let material = match bsdf {
@@ -183,7 +191,7 @@ pub fn light_names(description: &Description) -> Vec<String> {
         names.visit(&shape);
     }
     for light in root.children(Kind::Emitter) {
-        if light.plugin() != "ambient" {
+        if !["ambient", AREA].contains(&light.plugin()) {
             names.add(light.id());
         }
     }
@@ -238,6 +246,7 @@ pub fn build<C: ColorModel>(
         known: HashMap::new(),
         lights: Vec::new(),
         weights: Vec::new(),
+        worn: HashSet::new(),
         ambients: Vec::new(),
         problems: Problems::default(),
     };
@@ -248,6 +257,18 @@ pub fn build<C: ColorModel>(
     }
     let mut environment: Option<(LightId, Properties<'_>)> = None;
     for emitter in root.children(Kind::Emitter) {
+        // It is the light of the shapes that refer to it.
+        if emitter.plugin() == AREA {
+            if !builder.worn.contains(&emitter.node_id()) {
+                let warning =
+                    emitter.error("", "no shape refers to this light, which lights nothing");
+                builder
+                    .palettes
+                    .colors
+                    .warn(warning.help("nest it in a <shape>"));
+            }
+            continue;
+        }
         let Some(id) = builder.light(&emitter, None) else {
             continue;
         };
@@ -333,5 +354,30 @@ mod tests {
         let assets = Assets::load(&scene, None, None, &|| ()).unwrap();
         let built = build(&scene, &assets, Rgb, Method::Tree).unwrap();
         assert_eq!(built.lights().len(), names.len());
+    }
+
+    #[test]
+    fn an_area_light_at_the_top_is_that_of_the_shape_that_refers_to_it() {
+        let light = "<emitter type='area' id='l'><rgb name='radiance' value='2'/></emitter>";
+        for (shape, lights) in [
+            (
+                "<shape type='sphere' id='s'><ref id='l'/></shape>",
+                vec!["l"],
+            ),
+            (
+                "<shape type='sphere'><ref name='emitter' id='l'/></shape>",
+                vec!["l"],
+            ),
+            ("<shape type='sphere'/>", vec![]),
+        ] {
+            let text = format!("<scene version='3.0.0'>{light}{shape}</scene>");
+            let scene =
+                Description::parse(&text, Path::new("test.xml"), &Options::default()).unwrap();
+            assert_eq!(light_names(&scene), lights);
+            let assets = Assets::load(&scene, None, None, &|| ()).unwrap();
+            let built = build(&scene, &assets, Rgb, Method::Tree).unwrap();
+            assert_eq!(built.lights().len(), lights.len());
+            assert_eq!(built.warnings().is_empty(), !lights.is_empty());
+        }
     }
 }

@@ -13,11 +13,14 @@ use super::report::Report;
 use super::resolve::{self, Reference, Scopes};
 use super::upgrade::{self, Version};
 use super::xml::{self, Lines};
-use super::{Description, Kind, Node, NodeId, Options, Property, Value, transform, values};
+use super::{Description, Kind, Node, NodeId, Options, Property, Value, legacy, transform, values};
 use crate::error::{Error, Location, Problem, Result};
 
 /// Levels of nested plugins and includes.
 pub(super) const MAX_DEPTH: usize = 64;
+/// The shape that Mitsuba's writer puts around what it merges, be that no shape at all: what is in it stands as if the
+/// tag were not there.
+const MERGE: &str = "merge";
 /// Warnings that are kept.
 const MOST_WARNINGS: usize = 100;
 /// Elements in all files together.
@@ -45,8 +48,8 @@ pub(super) struct Reader<'o> {
     defines: Defines,
     report: Report,
     warnings: Vec<Problem>,
-    /// Nodes of files that are older than the current names.
-    old_nodes: Vec<NodeId>,
+    /// Nodes of files older than Mitsuba 3, with the version.
+    old_nodes: Vec<(NodeId, Version)>,
     elements: usize,
     includes: usize,
     /// Read from files beside the scene's own.
@@ -90,10 +93,17 @@ impl<'o> Reader<'o> {
         let mut report = std::mem::take(&mut self.report);
         self.defines.report_unused(&mut report);
         resolve::references(&mut self, &mut report);
-        for id in std::mem::take(&mut self.old_nodes) {
+        for (id, version) in std::mem::take(&mut self.old_nodes) {
             let node = &mut self.nodes[id.index()];
-            if let Err(error) = upgrade::texture_placement(node) {
+            if version < Version::CURRENT_NAMES
+                && let Err(error) = upgrade::texture_placement(node)
+            {
                 report.push(error);
+            }
+            if !self.options.strict {
+                for told in legacy::update(node) {
+                    self.warn(told);
+                }
             }
         }
         resolve::duplicates(&self.nodes, &mut report);
@@ -228,17 +238,21 @@ impl<'o> Reader<'o> {
         attributes: &[&str],
     ) -> Result<()> {
         let tag = element.tag;
-        let kind = Kind::of_tag(tag).ok_or_else(|| match tag {
-            "translate" | "rotate" | "scale" | "lookat" | "lookAt" | "matrix" => {
-                element.error(format!("<{tag}> stands inside <transform>"))
-            }
-            _ => {
-                let plugins = Kind::ALL.iter().map(|kind| kind.tag());
-                element
-                    .error(format!("unknown tag <{tag}>"))
-                    .suggest(tag, plugins.chain(values::TAGS).chain(STRUCTURE))
-            }
-        })?;
+        let old = file.version < Version::CURRENT && !self.options.strict;
+        let legacy_kind = || legacy::kind(tag).filter(|_| old);
+        let kind = Kind::of_tag(tag)
+            .or_else(legacy_kind)
+            .ok_or_else(|| match tag {
+                "translate" | "rotate" | "scale" | "lookat" | "lookAt" | "matrix" => {
+                    element.error(format!("<{tag}> stands inside <transform>"))
+                }
+                _ => {
+                    let plugins = Kind::ALL.iter().map(|kind| kind.tag());
+                    element
+                        .error(format!("unknown tag <{tag}>"))
+                        .suggest(tag, plugins.chain(values::TAGS).chain(STRUCTURE))
+                }
+            })?;
         if kind == Kind::Scene {
             return Err(element.error("<scene> cannot stand inside another tag"));
         }
@@ -247,7 +261,16 @@ impl<'o> Reader<'o> {
         }
         element.only(attributes)?;
         let name = element.optional("name").or(place.name).unwrap_or_default();
-        let id = self.node(element, file, kind, element.filled("type")?)?;
+        let mut plugin = element.filled("type")?;
+        if (kind, plugin) == (Kind::Shape, MERGE) {
+            self.children(element, file, place.parent, place.depth + 1);
+            return Ok(());
+        }
+        if let Some(today) = legacy::plugin(kind, plugin).filter(|_| old) {
+            self.warn(element.error(format!("{kind} {plugin:?} is read as {today:?}")));
+            plugin = today;
+        }
+        let id = self.node(element, file, kind, plugin)?;
         self.property(
             file,
             place.parent,
@@ -277,8 +300,8 @@ impl<'o> Reader<'o> {
             id: id.map(str::to_owned),
             ..description
         });
-        if file.version < Version::CURRENT_NAMES {
-            self.old_nodes.push(node);
+        if file.version < Version::CURRENT {
+            self.old_nodes.push((node, file.version));
         }
         Ok(node)
     }

@@ -208,3 +208,52 @@ fn what_mitsuba_takes_otherwise_is_told_and_what_it_passes_over_is_passed_over()
         "{warnings:?}"
     );
 }
+
+#[test]
+fn what_stands_in_a_merge_stands_as_if_that_were_not_there() {
+    let scene = parse(
+        "<scene version='3.9.1'><shape type='merge' id='m'><sensor type='s'/><bsdf type='b' id='b'/>
+         <shape type='merge'><shape type='cube'><ref id='b'/></shape></shape></shape>
+         <shape type='group'><shape type='merge'><shape type='ply'/></shape></shape></scene>",
+    )
+    .unwrap();
+    let root = scene.root();
+    assert_eq!(root.children(Kind::Sensor).len(), 1);
+    let shapes = root.children(Kind::Shape);
+    assert_eq!(shapes.len(), 2);
+    assert_eq!(shapes[0].children(Kind::Bsdf)[0].id(), Some("b"));
+    assert_eq!(shapes[1].children(Kind::Shape)[0].plugin(), "ply");
+}
+
+#[test]
+fn what_older_versions_meant_is_read_in_today_s_words_and_told() {
+    let text = |version: &str| {
+        format!(
+            "<scene version='{version}'>
+             <sensor type='a'><film type='ldrfilm'><boolean name='high_quality_edges' value='true'/>
+                <boolean name='banner' value='false'/><float name='gamma' value='2.2'/></film></sensor>
+             <texture type='bitmap' id='t'><string name='filter_type' value='trilinear'/>
+                <float name='gamma' value='1'/></texture>
+             <bsdf type='roughconductor' id='c'><float name='ext_eta' value='1'/></bsdf>
+             <bsdf type='conductor' id='d'><float name='ext_eta' value='1.3'/></bsdf></scene>"
+        )
+    };
+    let scene = parse(&text("2.1.0")).unwrap();
+    assert_eq!(scene.warnings().len(), 7, "{:?}", scene.warnings());
+    let film = scene.root().children(Kind::Sensor)[0].children(Kind::Film)[0];
+    assert_eq!(film.plugin(), "hdrfilm");
+    assert!(film.has("sample_border") && film.all().len() == 1);
+    let texture = scene.root().children(Kind::Texture)[0];
+    assert!(texture.has("raw") && !texture.has("gamma"));
+    assert_eq!(texture.string("filter_type").unwrap(), "bilinear");
+    let bsdfs = scene.root().children(Kind::Bsdf);
+    assert!(!bsdfs[0].has("ext_eta") && bsdfs[1].has("ext_eta"));
+    let today = parse(&text("3.0.0")).unwrap();
+    assert!(today.warnings().is_empty());
+    let film = today.root().children(Kind::Sensor)[0].children(Kind::Film)[0];
+    assert!(film.plugin() == "ldrfilm" && film.has("banner"));
+    let tags = "<camera type='a'/><luminaire type='b'/>";
+    let old = parse(&format!("<scene version='0.3.0'>{tags}</scene>")).unwrap();
+    assert_eq!(old.root().children(Kind::Sensor)[0].plugin(), "a");
+    assert!(parse(&format!("<scene version='3.0.0'>{tags}</scene>")).is_err());
+}
