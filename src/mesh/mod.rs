@@ -38,7 +38,7 @@ pub use generate::{
     Bumps, add_bumps, ball, block, bumpy_sphere, cube, flake, flake_balls, flake_scene, grid, hair,
     menger, menger_triangles, rectangle, sphere, terrain,
 };
-pub use gltf::{GltfCamera, GltfPart, GltfScene, Projection, read_gltf};
+pub use gltf::{GltfCamera, GltfPart, GltfScene, Projection, read_gltf, read_gltf_camera};
 pub use mtl::BARE_COLOR;
 pub use parts::{Part, Parts, read_parts};
 pub use ply::{check_writable, write_ply, write_text};

@@ -81,15 +81,11 @@ impl Parts {
 
 fn gltf_parts(path: &Path) -> Result<Parts> {
     let scene = gltf::read_gltf(path, &ReadOptions::default())?;
-    let colored = scene.parts.iter().any(|part| part.base_color != [1.0; 4]);
     let part = |part: gltf::GltfPart| {
         let mut mesh = part.mesh;
         if mesh.normals.is_empty() {
             // It is meant to be flat.
             mesh.unshare_vertices();
-        }
-        if colored {
-            mesh.attributes.push(part_color(&part.base_color, &mesh));
         }
         let name = part.name;
         Part { name, mesh }
@@ -99,15 +95,6 @@ fn gltf_parts(path: &Path) -> Result<Parts> {
         dropped_triangles: scene.dropped_triangles,
         warnings: scene.warnings,
     })
-}
-
-fn part_color([r, g, b, _]: &[f32; 4], mesh: &Mesh) -> Attribute {
-    Attribute {
-        name: "face_color".to_owned(),
-        channels: 3,
-        per: Per::Face,
-        values: [*r, *g, *b].repeat(mesh.triangles.len()),
-    }
 }
 
 fn serialized_parts(path: &Path) -> Result<Parts> {

@@ -10,7 +10,7 @@ use crate::description::{Description, Options};
 use crate::error::{Error, Location, Result};
 use crate::mesh::{
     Attribute, BARE_COLOR, GltfCamera, Mesh, MeshFile, Projection, ReadMesh, ReadOptions,
-    extension, read, read_gltf,
+    extension, read, read_gltf_camera,
 };
 
 /// Which way is up in a mesh file.
@@ -95,7 +95,7 @@ pub fn describe_mesh(path: &Path, up: UpAxis, options: &Options) -> Result<BareM
     }
     let up = up.direction();
     let camera = match plugin {
-        "gltf" => read_gltf(path, &read_options)?.camera,
+        "gltf" => read_gltf_camera(path)?,
         _ => None,
     };
     let text = scene(&Subject {

@@ -1,6 +1,6 @@
 //! `gltf`: the default scene of a glTF or GLB file `filename` as one mesh, with `to_world`, `face_normals`,
-//! `flip_normals` and `flip_tex_coords`; the materials' base colours are its attribute `face_color`. Étendue's
-//! own: Mitsuba has no such shape.
+//! `flip_normals` and `flip_tex_coords`; the materials' base colours are its attribute `face_color`, or where the file
+//! has colours of vertices `vertex_color`. Without normals it is flat. Étendue's own: Mitsuba has no such shape.
 
 use crate::description::Properties;
 use crate::description::declared::Plugin;

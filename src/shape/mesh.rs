@@ -275,7 +275,9 @@ fn place_in(setting: &Setting<'_>, mut mesh: Mesh, properties: &Properties<'_>) 
         // A transform can carry finite corners to infinity.
         dropped = mesh.check().dropped_triangles;
     }
-    if properties.boolean("face_normals")? {
+    // A glTF without normals is flat, says its specification.
+    let flat = properties.plugin() == "gltf" && mesh.normals.is_empty();
+    if properties.boolean("face_normals")? || flat {
         mesh.drop_normals();
     } else if mesh.normals.is_empty() {
         match setting.cache {

@@ -1,21 +1,34 @@
-//! glTF 2.0, as JSON or GLB: the meshes of the default scene in world space, their base colours, and the
-//! first camera. No images, skins, morph targets or animations. Texture coordinates have their origin at the
-//! top left, as Mitsuba's bitmaps have it, and stay as they are. A primitive without normals is flat, says
-//! the specification: its mesh has none. Under a mirroring transform the winding turns, so that the outside
-//! stays outside.
+//! glTF 2.0, as JSON or GLB: the meshes of the default scene in world space with their colours, and the first camera.
+//! Morph targets stand at their default weights, skins at their nodes' places. Pictures, lights and animations are
+//! left out, with a warning for each kind. Texture coordinates are those of the base colour, with their origin at the
+//! top left, as Mitsuba's bitmaps have it, and stay as they are. A primitive without normals is flat, says the
+//! specification: its mesh has none. Under a mirroring transform the winding turns, so that the outside stays outside.
 
-mod buffers;
+mod json;
 
+mod accessor;
+mod container;
+mod material;
+mod primitive;
+mod skin;
+mod stage;
+#[cfg(test)]
+mod tests;
+
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use glam::{DMat4, DVec4, Vec2, Vec3};
-use gltf::mesh::Mode;
-use gltf::{Document, Node, Primitive, Semantic};
+use glam::DMat4;
 
 use super::read::{Decoded, Input, Loaded, ReadOptions, warnings, with_input};
 use super::{Attribute, Mesh, Per};
 use crate::error::{Error, Location, Problem, Result};
-use buffers::{Buffers, Container};
+use accessor::Accessors;
+use container::{Buffers, Container};
+use json::{Instancing, Primitive, Root, at};
+use material::Coordinates;
+use primitive::{Mode, Recipe};
+use stage::{Placed, Stage, placement};
 
 /// A glTF scene.
 #[derive(Clone, Debug, Default)]
@@ -33,7 +46,8 @@ pub struct GltfScene {
 /// A primitive: a mesh of one material.
 #[derive(Clone, Debug)]
 pub struct GltfPart {
-    /// In world space. Without normals it is meant to be flat.
+    /// In world space. Without normals it is meant to be flat. Where the file has colours, they are its attribute
+    /// `vertex_color` or `face_color`: linear red, green and blue.
     pub mesh: Mesh,
     /// Linear red, green, blue, and alpha, in [0, 1]: the material's base colour factor.
     pub base_color: [f32; 4],
@@ -103,32 +117,76 @@ pub fn read_gltf(path: &Path, options: &ReadOptions) -> Result<GltfScene> {
         scene.warnings.extend(warnings);
         scene.parts.push(GltfPart { mesh, ..part });
     }
-    scene.warnings.extend(warnings(path, walk.warnings));
+    scene.warnings.extend(warnings(path, walk.notes.told()));
     Ok(scene)
 }
 
-/// All parts as one mesh; where the file gives base colours, they are its attribute `face_color`.
+/// The first camera of the default scene of the glTF or GLB file `path`; no mesh is read for it.
+///
+/// # Errors
+/// Where the file cannot be read or is malformed.
+pub fn read_gltf_camera(path: &Path) -> Result<Option<GltfCamera>> {
+    let bytes = with_input(path, |input| input.bytes())?;
+    let camera = || -> OrWhy<Option<GltfCamera>> {
+        let root = Root::parse(Container::open(&bytes)?.json)?;
+        Ok(Stage::set(&root, &mut Notes::default())?.camera)
+    };
+    camera().map_err(|why| Error::input(why).at(&Location::of_file(path)))
+}
+
+/// All parts as one mesh, with their colours.
 pub(super) fn read(input: Input<'_>, options: &ReadOptions) -> Result<Decoded> {
     let walk = walk(input, options)?;
-    let colored = walk.parts.iter().any(|part| part.base_color != [1.0; 4]);
     let mut mesh = Mesh::default();
-    for mut part in walk.parts {
-        if colored {
-            let [r, g, b, _] = part.base_color;
-            part.mesh.attributes.push(Attribute {
-                name: "face_color".to_owned(),
-                channels: 3,
-                per: Per::Face,
-                values: [r, g, b].repeat(part.mesh.triangles.len()),
-            });
-        }
+    for part in walk.parts {
         mesh.append(part.mesh);
     }
     Ok(Decoded {
         mesh,
-        warnings: walk.warnings,
+        warnings: walk.notes.told(),
         ..Decoded::default()
     })
+}
+
+/// What is left out of a file: told once for each kind.
+#[derive(Default)]
+struct Notes {
+    counts: BTreeMap<String, usize>,
+    /// Of materials.
+    unseen: BTreeSet<String>,
+}
+
+impl Notes {
+    fn add(&mut self, message: impl Into<String>) {
+        *self.counts.entry(message.into()).or_default() += 1;
+    }
+
+    fn told(self) -> Vec<String> {
+        let mut told: Vec<String> = (self.counts.into_iter())
+            .map(|(message, count)| match count {
+                1 => message,
+                _ => format!("{message} ({count} times)"),
+            })
+            .collect();
+        if !self.unseen.is_empty() {
+            let unseen: Vec<String> = self.unseen.into_iter().collect();
+            let unseen = unseen.join(", ");
+            told.push(format!(
+                "materials are shown by their base colour factor alone, without {unseen}"
+            ));
+        }
+        told
+    }
+}
+
+/// What was found on the way through the nodes.
+#[derive(Default)]
+struct Walk {
+    parts: Vec<GltfPart>,
+    camera: Option<GltfCamera>,
+    notes: Notes,
+    /// Vertices and corners so far.
+    size: usize,
 }
 
 fn walk(input: Input<'_>, options: &ReadOptions) -> Result<Walk> {
@@ -136,231 +194,216 @@ fn walk(input: Input<'_>, options: &ReadOptions) -> Result<Walk> {
     let bytes = input.bytes()?;
     let walked = || -> OrWhy<Walk> {
         let container = Container::open(&bytes)?;
-        let root = gltf::json::deserialize::from_slice(container.json);
-        let root = root.map_err(|e| format!("the JSON is malformed: {e}"))?;
-        check_attributes(&root)?;
-        let document = Document::from_json(root).map_err(|e| e.to_string())?;
-        let scene = document
-            .default_scene()
-            .or_else(|| document.scenes().next());
-        let scene = scene.ok_or("the file has no scene")?;
-        let buffers = Buffers::load(&document, container.binary, path)?;
-        let mut walk = Walk {
-            flip: options.flip_tex_coords.unwrap_or(false),
-            ..Walk::default()
+        let root = Root::parse(container.json)?;
+        let mut walk = Walk::default();
+        let stage = Stage::set(&root, &mut walk.notes)?;
+        walk.camera = stage.camera;
+        if !root.animations.is_empty() {
+            (walk.notes).add("animations are left out: nodes and weights stand at rest");
+        }
+        let buffers = Buffers::load(&root, container.binary, path);
+        let accessors = Accessors {
+            root: &root,
+            buffers: &buffers,
         };
-        walk.nodes(&document, scene.nodes(), &buffers)?;
+        for placed in &stage.nodes {
+            walk.node(placed, &stage, &accessors)?;
+        }
+        walk.color();
+        if options.flip_tex_coords.unwrap_or(false) {
+            for part in &mut walk.parts {
+                part.mesh.flip_uvs();
+            }
+        }
         Ok(walk)
     };
     walked().map_err(|why| Error::input(why).at(&Location::of_file(path)))
 }
 
-/// The crate's own validation indexes with these before it looks at their range.
-fn check_attributes(root: &gltf::json::Root) -> OrWhy<()> {
-    let primitives = root.meshes.iter().flat_map(|mesh| &mesh.primitives);
-    let mut accessors = primitives.flat_map(|p| p.attributes.values());
-    match accessors.find(|index| index.value() >= root.accessors.len()) {
-        Some(index) => Err(format!(
-            "accessor {index} is out of range; there are {}",
-            root.accessors.len()
-        )),
-        None => Ok(()),
-    }
-}
-
-/// What was found on the way through the nodes.
-#[derive(Default)]
-struct Walk {
-    flip: bool,
-    parts: Vec<GltfPart>,
-    camera: Option<GltfCamera>,
-    warnings: Vec<String>,
-    /// Vertices and corners so far.
-    size: usize,
-}
-
 impl Walk {
-    /// Visits `roots` and all below them in the order of the file.
-    fn nodes<'a>(
+    fn node(
         &mut self,
-        document: &'a Document,
-        roots: impl Iterator<Item = Node<'a>>,
-        buffers: &Buffers,
+        placed: &Placed<'_>,
+        stage: &Stage<'_>,
+        accessors: &Accessors<'_>,
     ) -> OrWhy<()> {
-        let mut seen = vec![false; document.nodes().len()];
-        let mut left: Vec<(Node<'a>, DMat4)> = roots.map(|node| (node, DMat4::IDENTITY)).collect();
-        left.reverse();
-        while let Some((node, parent)) = left.pop() {
-            let index = node.index();
-            if std::mem::replace(&mut seen[index], true) {
-                return Err(format!(
-                    "node {index} has two parents, or is its own ancestor"
-                ));
-            }
-            let columns = node
-                .transform()
-                .matrix()
-                .map(|c| DVec4::from(c.map(f64::from)));
-            let to_world =
-                parent * DMat4::from_cols(columns[0], columns[1], columns[2], columns[3]);
-            if self.camera.is_none() {
-                self.camera = camera(document, &node, to_world);
-            }
-            if let Some(mesh) = node.mesh() {
-                let name = node.name().or(mesh.name()).unwrap_or_default();
-                for primitive in mesh.primitives() {
-                    let read = self.primitive(&primitive, &to_world, name, buffers);
-                    read.map_err(|e| {
-                        format!(
-                            "mesh {}, primitive {}: {e}",
-                            mesh.index(),
-                            primitive.index()
-                        )
-                    })?;
-                }
-            }
-            let first = left.len();
-            left.extend(node.children().map(|child| (child, to_world)));
-            left[first..].reverse();
+        let Some(index) = placed.node.mesh else {
+            return Ok(());
+        };
+        let mesh = at(&accessors.root.meshes, index, "mesh")?;
+        let name = placed.node.name.as_ref().or(mesh.name.as_ref());
+        let weights = placed.node.weights.as_ref().unwrap_or(&mesh.weights);
+        let places = places(placed, accessors)?;
+        for (i, primitive) in mesh.primitives.iter().enumerate() {
+            let own = Own {
+                primitive,
+                weights,
+                places: &places,
+            };
+            let part = self.primitive(&own, placed, stage, accessors);
+            let part = part.map_err(|why| format!("mesh {index}, primitive {i}: {why}"))?;
+            self.parts.extend(part.map(|part| GltfPart {
+                name: name.cloned().unwrap_or_default(),
+                ..part
+            }));
         }
         Ok(())
     }
 
+    /// A primitive in the world, as often as it stands there.
     fn primitive(
         &mut self,
-        primitive: &Primitive<'_>,
-        to_world: &DMat4,
-        name: &str,
-        buffers: &Buffers,
-    ) -> OrWhy<()> {
-        if !matches!(
-            primitive.mode(),
-            Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan
-        ) {
-            self.warnings.push(format!(
-                "{:?} of {name:?} left out: only triangles are read",
-                primitive.mode()
-            ));
-            return Ok(());
+        own: &Own<'_>,
+        placed: &Placed<'_>,
+        stage: &Stage<'_>,
+        accessors: &Accessors<'_>,
+    ) -> OrWhy<Option<GltfPart>> {
+        let Some(mode) = Mode::of(own.primitive)? else {
+            self.notes.add("points and lines are left out");
+            return Ok(None);
+        };
+        let root = accessors.root;
+        let material = own.primitive.material;
+        let material = material.map(|m| at(&root.materials, m, "material"));
+        let material = material.transpose()?;
+        let base_color = material.map_or([1.0; 4], |m| m.base_color());
+        let recipe = Recipe {
+            accessors,
+            primitive: own.primitive,
+            weights: own.weights,
+            coordinates: Coordinates::of(material),
+            base_color,
+        };
+        recipe.check_compression()?;
+        let Some(size) = recipe.size()? else {
+            self.notes.add("primitives without positions are left out");
+            return Ok(None);
+        };
+        if let Some(material) = material {
+            material.note_unseen(&mut self.notes.unseen);
         }
-        let positions = primitive
-            .get(&Semantic::Positions)
-            .ok_or("it has no positions")?;
-        let corners = primitive.indices().map_or(positions.count(), |i| i.count());
-        self.size = self
-            .size
-            .saturating_add(positions.count())
-            .saturating_add(corners);
+        for name in recipe.unread() {
+            self.notes.add(format!("vertex data {name} are left out"));
+        }
+        self.size = (self.size).saturating_add(size.saturating_mul(own.places.len()));
         if self.size > MOST {
             return Err(format!(
                 "the scene has more than {MOST} vertices and corners when its meshes are placed"
             ));
         }
-        let mut mesh = Mesh {
-            positions: buffers
-                .rows(&positions)?
-                .into_iter()
-                .map(Vec3::from_array)
-                .collect(),
-            ..Mesh::default()
-        };
-        let vertices = mesh.positions.len();
-        let same_count = |what: &str, count: usize| match count == vertices {
-            true => Ok(()),
-            false => Err(format!("{count} {what} for {vertices} vertices")),
-        };
-        if let Some(normals) = primitive.get(&Semantic::Normals) {
-            mesh.normals = buffers
-                .rows(&normals)?
-                .into_iter()
-                .map(Vec3::from_array)
-                .collect();
-            same_count("normals", mesh.normals.len())?;
+        let mut mesh = recipe.mesh(mode)?;
+        if let Some(skin) = placed.node.skin {
+            let skin = at(&root.skins, skin, "skin")?;
+            skin.pose(
+                &mut mesh,
+                &own.primitive.attributes,
+                accessors,
+                &stage.world,
+            )?;
+        } else {
+            mesh = placed_at(mesh, own.places);
         }
-        if let Some(uvs) = primitive.get(&Semantic::TexCoords(0)) {
-            mesh.uvs = buffers
-                .rows(&uvs)?
-                .into_iter()
-                .map(Vec2::from_array)
-                .collect();
-            same_count("texture coordinates", mesh.uvs.len())?;
-            if self.flip {
-                mesh.flip_uvs();
+        Ok(Some(GltfPart {
+            mesh,
+            base_color,
+            name: String::new(),
+        }))
+    }
+
+    /// Gives the parts their colours, all in one way so that they can be put together: those of vertices where any
+    /// part has them, else those of materials where any is not white.
+    fn color(&mut self) {
+        let by_vertex = self.parts.iter().any(|p| !p.mesh.attributes.is_empty());
+        let colored = self.parts.iter().any(|p| p.base_color != [1.0; 4]);
+        if !by_vertex && !colored {
+            return;
+        }
+        for GltfPart {
+            mesh, base_color, ..
+        } in &mut self.parts
+        {
+            if !mesh.attributes.is_empty() {
+                continue;
             }
+            let (name, per, count) = match by_vertex {
+                true => ("vertex_color", Per::Vertex, mesh.positions.len()),
+                false => ("face_color", Per::Face, mesh.triangles.len()),
+            };
+            mesh.attributes.push(Attribute {
+                name: name.to_owned(),
+                channels: 3,
+                per,
+                values: base_color[..3].repeat(count),
+            });
         }
-        let indices = match primitive.indices() {
-            Some(accessor) => buffers.indices(&accessor)?,
-            None => (0..u32::try_from(vertices).map_err(|e| e.to_string())?).collect(),
-        };
-        if let Some(at) = indices.iter().position(|&i| i as usize >= vertices) {
-            return Err(format!(
-                "index {at} is {}, out of range; there are {vertices} vertices",
-                indices[at]
-            ));
-        }
-        mesh.triangles = triangles(&indices, primitive.mode());
+    }
+}
+
+/// What a node shows of its mesh.
+struct Own<'a> {
+    primitive: &'a Primitive,
+    /// Of the morph targets.
+    weights: &'a [f32],
+    places: &'a [DMat4],
+}
+
+/// Where a node's mesh stands: in the node's place, or by EXT_mesh_gpu_instancing in several relative to it.
+fn places(placed: &Placed<'_>, accessors: &Accessors<'_>) -> OrWhy<Vec<DMat4>> {
+    let Placed { node, to_world } = placed;
+    let Some(Instancing { attributes }) = &node.extensions.instancing else {
+        return Ok(vec![*to_world]);
+    };
+    fn rows<const N: usize>(
+        attribute: Option<&usize>,
+        accessors: &Accessors<'_>,
+    ) -> OrWhy<Option<Vec<[f64; N]>>> {
+        let rows = attribute.map(|&index| accessors.rows::<N>(index));
+        let rows = rows.transpose()?;
+        Ok(rows.map(|rows| rows.into_iter().map(|row| row.map(f64::from)).collect()))
+    }
+    let translations = rows::<3>(attributes.get("TRANSLATION"), accessors)?;
+    let rotations = rows::<4>(attributes.get("ROTATION"), accessors)?;
+    let scales = rows::<3>(attributes.get("SCALE"), accessors)?;
+    let counts = [
+        translations.as_ref().map(Vec::len),
+        rotations.as_ref().map(Vec::len),
+        scales.as_ref().map(Vec::len),
+    ];
+    let mut counts = counts.into_iter().flatten();
+    let count = counts.next().unwrap_or(0);
+    if counts.any(|other| other != count) {
+        return Err(
+            "the instances of a node have translations, rotations and scales of different counts"
+                .to_owned(),
+        );
+    }
+    let place = |i: usize| {
+        let instance = placement(
+            translations.as_ref().map(|rows| rows[i]),
+            rotations.as_ref().map(|rows| rows[i]),
+            scales.as_ref().map(|rows| rows[i]),
+        );
+        *to_world * instance
+    };
+    Ok((0..count).map(place).collect())
+}
+
+/// A mesh in all of its places.
+fn placed_at(mesh: Mesh, places: &[DMat4]) -> Mesh {
+    let place = |mut mesh: Mesh, to_world: &DMat4| {
         mesh.transform(to_world);
         if to_world.determinant() < 0.0 {
             mesh.triangles.iter_mut().for_each(|t| t.swap(1, 2));
         }
-        let base_color = primitive
-            .material()
-            .pbr_metallic_roughness()
-            .base_color_factor();
-        self.parts.push(GltfPart {
-            mesh,
-            base_color,
-            name: name.to_owned(),
-        });
-        Ok(())
-    }
-}
-
-fn triangles(indices: &[u32], mode: Mode) -> Vec<[u32; 3]> {
-    match mode {
-        Mode::TriangleStrip => indices
-            .windows(3)
-            .enumerate()
-            .map(|(i, w)| {
-                if i % 2 == 0 {
-                    [w[0], w[1], w[2]]
-                } else {
-                    [w[1], w[0], w[2]]
-                }
-            })
-            .collect(),
-        Mode::TriangleFan => indices
-            .windows(2)
-            .skip(1)
-            .map(|w| [indices[0], w[0], w[1]])
-            .collect(),
-        _ => indices.as_chunks().0.to_vec(),
-    }
-}
-
-/// The node's camera, unless the file says its kind and leaves out the numbers.
-fn camera(document: &Document, node: &Node<'_>, to_world: DMat4) -> Option<GltfCamera> {
-    // The crate's own accessor panics where the numbers are left out.
-    let json = document.as_json().cameras.get(node.camera()?.index())?;
-    let (projection, near, far) = if let Some(p) = &json.perspective {
-        let projection = Projection::Perspective {
-            fov_y: p.yfov.into(),
-            aspect: p.aspect_ratio.map(f64::from),
-        };
-        (projection, p.znear, p.zfar)
-    } else if let Some(o) = &json.orthographic {
-        let projection = Projection::Orthographic {
-            half_width: o.xmag.into(),
-            half_height: o.ymag.into(),
-        };
-        (projection, o.znear, Some(o.zfar))
-    } else {
-        return None;
+        mesh
     };
-    Some(GltfCamera {
-        to_world,
-        projection,
-        near: near.into(),
-        far: far.map(f64::from),
-    })
+    let Some((last, others)) = places.split_last() else {
+        return Mesh::default();
+    };
+    let mut all = Mesh::default();
+    for to_world in others {
+        all.append(place(mesh.clone(), to_world));
+    }
+    all.append(place(mesh, last));
+    all
 }

@@ -1,0 +1,158 @@
+//! The nodes of a glTF scene, with their places in the world.
+
+use glam::{DMat4, DQuat, DVec3};
+
+use super::json::{Camera, Node, Root, Scene, at};
+use super::{GltfCamera, Notes, OrWhy, Projection};
+
+/// What stands in a scene.
+pub(super) struct Stage<'r> {
+    /// In the order of the file, parents before their children.
+    pub(super) nodes: Vec<Placed<'r>>,
+    /// From the space of each node of the file to the world; `None`: not in the scene.
+    pub(super) world: Vec<Option<DMat4>>,
+    /// The first camera of the scene.
+    pub(super) camera: Option<GltfCamera>,
+}
+
+/// A node in its place.
+pub(super) struct Placed<'r> {
+    pub(super) node: &'r Node,
+    pub(super) to_world: DMat4,
+}
+
+impl<'r> Stage<'r> {
+    /// The default scene's nodes, or the first scene's; where there is none, all that no other node has for a child.
+    pub(super) fn set(root: &'r Root<'_>, notes: &mut Notes) -> OrWhy<Self> {
+        let mut stage = Self {
+            nodes: Vec::new(),
+            world: vec![None; root.nodes.len()],
+            camera: None,
+        };
+        let roots = match (root.scene, root.scenes.first()) {
+            (Some(index), _) => at(&root.scenes, index, "scene")?.nodes.clone(),
+            (None, Some(Scene { nodes })) => nodes.clone(),
+            (None, None) => {
+                notes.add("the file has no scene: all of its nodes are shown");
+                orphans(&root.nodes)
+            }
+        };
+        let mut left: Vec<(usize, DMat4)> = roots.iter().map(|&n| (n, DMat4::IDENTITY)).collect();
+        left.reverse();
+        while let Some((index, parent)) = left.pop() {
+            let node = at(&root.nodes, index, "node")?;
+            let to_world = parent * node.matrix();
+            if stage.world[index].replace(to_world).is_some() {
+                return Err(format!(
+                    "node {index} has two parents, or is its own ancestor"
+                ));
+            }
+            let visibility = node.extensions.visibility.as_ref();
+            if visibility.and_then(|v| v.visible) == Some(false) {
+                notes.add("invisible nodes are left out (KHR_node_visibility)");
+                continue;
+            }
+            stage.look(root, node, &to_world, notes)?;
+            stage.nodes.push(Placed { node, to_world });
+            let first = left.len();
+            left.extend(node.children.iter().map(|&child| (child, to_world)));
+            left[first..].reverse();
+        }
+        Ok(stage)
+    }
+
+    /// Notes the node's camera and light.
+    fn look(
+        &mut self,
+        root: &Root<'_>,
+        node: &Node,
+        to_world: &DMat4,
+        notes: &mut Notes,
+    ) -> OrWhy<()> {
+        if node.extensions.light.is_some() {
+            notes.add("lights are left out (KHR_lights_punctual)");
+        }
+        let Some(camera) = node.camera else {
+            return Ok(());
+        };
+        let camera = at(&root.cameras, camera, "camera")?.placed(to_world);
+        match camera {
+            Some(_) if self.camera.is_some() => notes.add("cameras after the first are left out"),
+            Some(GltfCamera {
+                projection: Projection::Orthographic { .. },
+                ..
+            }) => notes.add("an orthographic camera is not looked through"),
+            _ => {}
+        }
+        self.camera = self.camera.or(camera);
+        Ok(())
+    }
+}
+
+/// The nodes that no other node has for a child.
+fn orphans(nodes: &[Node]) -> Vec<usize> {
+    let mut orphan = vec![true; nodes.len()];
+    for &child in nodes.iter().flat_map(|node| &node.children) {
+        if let Some(orphan) = orphan.get_mut(child) {
+            *orphan = false;
+        }
+    }
+    (0..nodes.len()).filter(|&node| orphan[node]).collect()
+}
+
+impl Node {
+    /// From its own space to its parent's.
+    fn matrix(&self) -> DMat4 {
+        match &self.matrix {
+            Some(columns) => DMat4::from_cols_array(columns),
+            None => placement(self.translation, self.rotation, self.scale),
+        }
+    }
+}
+
+/// A translation after a rotation after a scale.
+pub(super) fn placement(
+    translation: Option<[f64; 3]>,
+    rotation: Option<[f64; 4]>,
+    scale: Option<[f64; 3]>,
+) -> DMat4 {
+    // Files have them in single precision at best.
+    let rotation = DQuat::from_array(rotation.unwrap_or([0.0, 0.0, 0.0, 1.0]));
+    let length = rotation.length();
+    let rotation = if length > 0.0 && length.is_finite() {
+        rotation / length
+    } else {
+        DQuat::IDENTITY
+    };
+    DMat4::from_scale_rotation_translation(
+        DVec3::from(scale.unwrap_or([1.0; 3])),
+        rotation,
+        DVec3::from(translation.unwrap_or_default()),
+    )
+}
+
+impl Camera {
+    /// `None` where the file leaves out the numbers.
+    fn placed(&self, to_world: &DMat4) -> Option<GltfCamera> {
+        let (projection, near, far) = if let Some(p) = &self.perspective {
+            let projection = Projection::Perspective {
+                fov_y: p.yfov,
+                aspect: p.aspect_ratio,
+            };
+            (projection, p.znear, p.zfar)
+        } else {
+            let o = self.orthographic.as_ref()?;
+            let projection = Projection::Orthographic {
+                half_width: o.xmag,
+                half_height: o.ymag,
+            };
+            (projection, o.znear, Some(o.zfar))
+        };
+        Some(GltfCamera {
+            to_world: *to_world,
+            projection,
+            near,
+            far,
+        })
+    }
+}
