@@ -24,7 +24,7 @@ mod xml;
 mod tests;
 
 use std::fmt;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use glam::{DMat4, DVec3};
 
@@ -215,11 +215,18 @@ pub struct Description {
     nodes: Vec<Node>,
     scopes: Scopes,
     warnings: Vec<Problem>,
+    /// As [`Description::sources`].
+    sources: Vec<PathBuf>,
     /// As [`Options::strict`].
     strict: bool,
 }
 
 impl Description {
+    /// The texts that the description was read from: the scene, what it includes, and files of spectra; each once.
+    pub fn sources(&self) -> &[PathBuf] {
+        &self.sources
+    }
+
     /// Reads the scene file at `path`.
     ///
     /// # Errors

@@ -27,7 +27,7 @@ pub(super) struct Materials {
     /// What was odd, in words.
     pub(super) warnings: Vec<String>,
     /// Libraries read or tried.
-    libraries: Vec<PathBuf>,
+    pub(super) libraries: Vec<PathBuf>,
     /// Whether a material has a picture for its colour.
     textured: bool,
     /// Materials beyond [`MOST_MATERIALS`].

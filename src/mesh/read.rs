@@ -51,6 +51,8 @@ pub struct Loaded {
     pub dropped_triangles: usize,
     /// What was odd in the file and did not prevent reading it.
     pub warnings: Vec<Problem>,
+    /// The files that this one names and that were read for it, or tried: buffers of glTF, material libraries of OBJ.
+    pub files: Vec<PathBuf>,
 }
 
 /// A file, and how it is read: those who agree in both can share a mesh.
@@ -287,6 +289,8 @@ pub(super) struct Decoded {
     pub(super) warnings: Vec<String>,
     /// Which of the triangles are fans.
     pub(super) polygons: Polygons,
+    /// As [`Loaded::files`].
+    pub(super) files: Vec<PathBuf>,
 }
 
 impl Decoded {
@@ -324,6 +328,7 @@ impl Decoded {
             mesh: self.mesh,
             dropped_triangles,
             warnings: warnings(path, self.warnings),
+            files: self.files,
         }
     }
 }

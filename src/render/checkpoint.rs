@@ -26,9 +26,7 @@ impl Checkpoint {
     }
 }
 
-const MARK: &[u8; 16] = b"etendue sums 2\r\n";
-/// No header is longer.
-const MAX_HEADER: u32 = 1 << 16;
+const MARK: &[u8; 16] = b"etendue sums 3\r\n";
 /// Sums converted at a time.
 const CHUNK: usize = 1 << 13;
 
@@ -191,7 +189,7 @@ fn load(path: &Path, expected: &Fingerprint, data: &mut [f64]) -> Result<Header>
     let mut length = [0; 4];
     input.read_exact(&mut length).map_err(failed)?;
     let length = u32::from_le_bytes(length);
-    if length > MAX_HEADER {
+    if u64::from(length) > about.len() {
         return Err(damaged(path, "its header is too long"));
     }
     let mut json = vec![0; length as usize];

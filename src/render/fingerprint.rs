@@ -3,8 +3,8 @@
 //! need not be loaded again. Threads and the way rays find shapes are left out: the bits do not depend on
 //! them.
 
+use std::collections::HashSet;
 use std::fs::{self, File};
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use blake3::Hasher;
@@ -15,7 +15,6 @@ use super::options::{Colors, Options};
 use super::plan::{PASS, TILE};
 use crate::description::{Canonical, Description, NodeId, Part};
 use crate::error::{Error, Result};
-use crate::mesh;
 
 /// What an image depends on, part by part.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -24,28 +23,82 @@ pub(super) struct Fingerprint {
     version: String,
     /// Shapes, materials and lights.
     scene: String,
-    /// Contents of meshes and images.
-    files: String,
+    /// Meshes and images, with the files that they name.
+    files: Vec<FileHash>,
     /// Sensor, film, sampler and integrator.
     view: String,
     /// Seed and colours.
     settings: String,
+    /// The texts that say scene and view: they tell which of them is another, and may differ in what does not matter.
+    sources: Vec<FileHash>,
+}
+
+/// A file and what it holds.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+struct FileHash {
+    /// As it was found: it may be another after a move of the folder.
+    name: String,
+    /// Of its content; `None`: it cannot be read, which may be no error.
+    hash: Option<String>,
+}
+
+/// The content of the files of a scene.
+#[derive(Clone, Debug)]
+pub(super) struct Contents {
+    files: Vec<FileHash>,
+    sources: Vec<FileHash>,
+}
+
+impl Contents {
+    /// Reads all files that the scene names, and those that were read because these name them (`named`), each once:
+    /// it takes the time to read them.
+    pub(super) fn read(description: &Description, named: &[PathBuf]) -> Result<Self> {
+        let mut files = Vec::new();
+        let mut seen = HashSet::new();
+        for path in description.files(Part::Scene) {
+            if seen.insert(resolved(&path)) {
+                let hash = hash_file(&path).map_err(|e| Error::system("read", &path, &e))?;
+                files.push(FileHash::new(&path, Some(hash)));
+            }
+        }
+        for path in named {
+            if seen.insert(resolved(path)) {
+                files.push(FileHash::new(path, hash_file(path).ok()));
+            }
+        }
+        let mut sources = Vec::new();
+        for path in description.sources() {
+            if seen.insert(resolved(path)) {
+                sources.push(FileHash::new(path, hash_file(path).ok()));
+            }
+        }
+        Ok(Self { files, sources })
+    }
+}
+
+impl FileHash {
+    fn new(path: &Path, hash: Option<String>) -> Self {
+        Self {
+            name: path.display().to_string(),
+            hash,
+        }
+    }
 }
 
 impl Fingerprint {
-    /// With the [`contents`] of the files that the scene names.
+    /// With the [`Contents`] of the scene's files.
     pub(super) fn new(
         description: &Description,
         sensor: NodeId,
-        contents: &str,
+        contents: &Contents,
         options: &Options,
     ) -> Result<Self> {
         let scene = description.canonical(Part::Scene);
         let view = description.canonical(Part::View(sensor));
-        let mut files = Hasher::new();
-        files.update(contents.as_bytes());
+        let Contents { mut files, sources } = contents.clone();
         for path in &view.files {
-            hash_file(&mut files, path)?;
+            let hash = hash_file(path).map_err(|e| Error::system("read", path, &e))?;
+            files.push(FileHash::new(path, Some(hash)));
         }
         let bands = match options.colors {
             Colors::Rgb => 0,
@@ -58,110 +111,85 @@ impl Fingerprint {
         Ok(Self {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             scene: hash(&scene.text),
-            files: hex(&files),
+            files,
             view: hash(&view.text),
             settings: hash(&settings),
+            sources,
         })
     }
 
     /// What is not the same in `other`, in words.
-    pub(super) fn difference(&self, other: &Self) -> Option<&'static str> {
-        [
-            (&self.version, &other.version, "the version of Étendue"),
-            (
-                &self.scene,
-                &other.scene,
-                "the scene (its shapes, materials or lights)",
-            ),
-            (
-                &self.files,
-                &other.files,
-                "a mesh or an image that the scene names",
-            ),
-            (
-                &self.view,
-                &other.view,
-                "the view (sensor, film, sampler or integrator, or an option for them)",
-            ),
-            (
-                &self.settings,
-                &other.settings,
-                "a setting (the seed, the bands or adaptive sampling)",
-            ),
-        ]
-        .into_iter()
-        .find(|(a, b, _)| a != b)
-        .map(|(_, _, what)| what)
+    pub(super) fn difference(&self, other: &Self) -> Option<String> {
+        let sources = || match &changed(&self.sources, &other.sources)[..] {
+            [] => String::new(),
+            names => format!("; see {}", names[..names.len().min(3)].join(", ")),
+        };
+        if self.version != other.version {
+            Some("the version of Étendue".to_owned())
+        } else if self.scene != other.scene {
+            let sources = sources();
+            Some(format!(
+                "the scene (its shapes, materials or lights{sources})"
+            ))
+        } else if let Some(name) = changed(&self.files, &other.files).first() {
+            Some(format!("the file {name}"))
+        } else if self.view != other.view {
+            let sources = sources();
+            Some(format!(
+                "the view (sensor, film, sampler or integrator, or an option for them{sources})"
+            ))
+        } else if self.settings != other.settings {
+            Some("a setting (the seed, the bands or adaptive sampling)".to_owned())
+        } else {
+            None
+        }
     }
 }
 
-/// The hash of all files that the scene names: it takes the time to read them.
-pub(super) fn contents(description: &Description) -> Result<String> {
-    let mut hasher = Hasher::new();
-    for path in description.files(Part::Scene) {
-        hash_file(&mut hasher, &path)?;
-    }
-    Ok(hex(&hasher))
+/// The files of one list whose content is not that of their counterparts in the other.
+fn changed<'a>(these: &'a [FileHash], others: &'a [FileHash]) -> Vec<&'a str> {
+    let common = these.iter().zip(others);
+    let differ = common.filter(|(this, other)| this.hash != other.hash);
+    let (fewer, more) = match these.len() < others.len() {
+        true => (these, others),
+        false => (others, these),
+    };
+    let all = differ.map(|(this, _)| this).chain(&more[fewer.len()..]);
+    all.map(|file| file.name.as_str()).collect()
+}
+
+/// The same file under the one name that it has, whatever the way to it.
+fn resolved(path: &Path) -> PathBuf {
+    path.canonicalize().unwrap_or_else(|_| path.to_owned())
 }
 
 fn hash(text: &str) -> String {
     blake3::hash(text.as_bytes()).to_hex().to_string()
 }
 
-fn hex(hasher: &Hasher) -> String {
-    hasher.finalize().to_hex().to_string()
-}
-
-/// Adds a file's length and content, and those of the files that a glTF file names in its turn.
-fn hash_file(hasher: &mut Hasher, path: &Path) -> Result<()> {
-    let refused = |e: std::io::Error| Error::system("read", path, &e);
-    let file = File::open(path).map_err(refused)?;
-    let length = file.metadata().map_err(refused)?.len();
-    hasher.update(&length.to_le_bytes());
-    hasher.update_reader(file.take(length)).map_err(refused)?;
-    for buffer in buffers(path) {
-        hash_file(hasher, &buffer)?;
+fn hash_file(path: &Path) -> std::io::Result<String> {
+    // Asked before it is opened, for opening a pipe may wait for ever.
+    if !fs::metadata(path)?.is_file() {
+        return Err(std::io::Error::other("no regular file"));
     }
-    Ok(())
+    let mut hasher = Hasher::new();
+    hasher.update_reader(File::open(path)?)?;
+    Ok(hasher.finalize().to_hex().to_string())
 }
 
-/// The largest glTF file that is searched for names.
-const MAX_GLTF: u64 = 256 << 20;
-
-/// The existing files that a glTF file (as text) names; none of other files, nor where it is damaged,
-/// which is for its reader to say.
-fn buffers(path: &Path) -> Vec<PathBuf> {
-    let read = || {
-        let mut text = Vec::new();
-        let contents = mesh::contents(path).ok()?;
-        contents.take(MAX_GLTF).read_to_end(&mut text).ok()?;
-        Some(text)
-    };
-    let is_gltf = mesh::extension(path) == "gltf";
-    let text = is_gltf.then(read).flatten();
-    let Some(json) = text.and_then(|text| serde_json::from_slice::<serde_json::Value>(&text).ok())
-    else {
-        return Vec::new();
-    };
-    let entries = ["buffers", "images"].map(|list| json[list].as_array().cloned());
-    let folder = path.parent().unwrap_or(Path::new(""));
-    let uris = entries.into_iter().flatten().flatten();
-    uris.filter_map(|entry| Some(folder.join(entry["uri"].as_str()?)))
-        .filter(|file| file != path && file.is_file())
-        .collect()
-}
-
-/// Names the scene part of a description within this process: files stand with their length and time of
-/// change in place of their content.
+/// Names the scene part of a description within this process: files stand with their [stamps](stamps) in place of their
+/// content.
 pub(super) fn scene_key(description: &Description) -> String {
     let Canonical { text, files } = description.canonical(Part::Scene);
-    let mut hasher = Hasher::new();
-    hasher.update(text.as_bytes());
-    for file in files {
-        let stamp = fs::metadata(&file)
-            .ok()
-            .map(|m| (m.len(), m.modified().ok()));
-        hasher.update(format!("{}\0{stamp:?}\0", file.display()).as_bytes());
-    }
-    hex(&hasher)
+    hash(&format!("{text}{}", stamps(&files)))
+}
+
+/// Lengths and times of change of files.
+pub(super) fn stamps(files: &[PathBuf]) -> String {
+    let stamp = |file: &PathBuf| {
+        let about = fs::metadata(file).ok();
+        let stamp = about.map(|m| (m.len(), m.modified().ok()));
+        format!("{}\0{stamp:?}\0", file.display())
+    };
+    files.iter().map(stamp).collect()
 }

@@ -3,10 +3,10 @@
 //! the next render, which may be of another view or frame.
 
 use std::any::Any;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-use super::fingerprint::{self, Fingerprint};
+use super::fingerprint::{self, Contents, Fingerprint};
 use super::memory::{self, Estimate};
 use super::options::{Colors, Options};
 use super::plan::Completed;
@@ -29,6 +29,8 @@ use crate::shape::Bounds;
 #[derive(Debug)]
 pub(super) struct Kept {
     key: Key,
+    /// Stamps of the files that the scene's files name.
+    stamps: String,
     /// A `Scene<C>`, where the key's colours say which `C`.
     scene: Box<dyn Any + Send>,
     facts: Facts,
@@ -73,8 +75,17 @@ pub(super) struct Facts {
     pub(super) warnings: Vec<Problem>,
     /// What the folder of trees was good for, until a render has told it.
     pub(super) cache: Option<CacheUse>,
-    /// The hash of the scene's files, once it was asked for.
-    contents: OnceLock<String>,
+    /// The files that were read because the scene's files name them.
+    files: Vec<PathBuf>,
+    /// What the scene's files hold, once it was asked for.
+    contents: OnceLock<Contents>,
+}
+
+impl Facts {
+    /// Of the files that the scene's files name.
+    fn stamps(&self) -> String {
+        fingerprint::stamps(&self.files)
+    }
 }
 
 /// What a scene is looked at with.
@@ -279,6 +290,7 @@ fn make<C: ColorModel>(
         bytes: [assets.bytes(), scene.tracer().tree_bytes()],
         warnings: warnings.cloned().collect(),
         cache: options.cache.as_ref().map(|_| cache),
+        files: assets.files().to_vec(),
         contents: OnceLock::new(),
     };
     Ok((scene, facts, seconds))
@@ -313,12 +325,14 @@ pub(super) fn prepare<'k, C: ColorModel>(
     });
     let share = share.unwrap_or_default();
     let film = share.film;
-    if kept.as_ref().is_none_or(|kept| kept.key != key) {
+    let fresh = |kept: &Kept| kept.key == key && kept.stamps == kept.facts.stamps();
+    if !kept.as_ref().is_some_and(fresh) {
         *kept = None;
         let source = Source { description, given };
         let made = make(source, options, color, share, progress);
         *kept = problems.take(made).map(|(scene, facts, spent)| Kept {
             key,
+            stamps: facts.stamps(),
             scene: Box::new(scene),
             facts,
             spent,
@@ -379,7 +393,7 @@ impl<C: ColorModel> Job<'_, C> {
         let contents = match known.get() {
             Some(contents) => contents,
             None => {
-                let contents = fingerprint::contents(description)?;
+                let contents = Contents::read(description, &self.facts.files)?;
                 known.get_or_init(|| contents)
             }
         };

@@ -223,7 +223,7 @@ fn a_checkpoint_of_another_render_is_refused_and_says_what_is_another() {
         FLOOR.replace("-9 -1 -9", "-8 -1 -9"),
     )
     .unwrap();
-    assert!(refusal(&scene, &options).contains("a mesh or an image"));
+    assert!(refusal(&scene, &options).contains("floor.ply"));
     fs::write(place.path("floor.ply"), FLOOR).unwrap();
     let again = place.scene(&format!("<!-- the same -->\n{SCENE}"));
     assert!(render(&again, &options, &Silent).is_ok());

@@ -6,8 +6,8 @@
 //! `to_world` (a node's matrix is its parent's times its own), and of which those without a material have the group's.
 //! The graph is flattened here: a shape is loaded for each path that leads to it, in world space.
 
-use std::collections::HashMap;
-use std::path::Path;
+use std::collections::{BTreeSet, HashMap};
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use glam::DMat4;
@@ -27,6 +27,7 @@ pub struct Assets {
     pub(super) shapes: Vec<Member>,
     pub(super) instances: Vec<Instance>,
     pub(super) warnings: Vec<Problem>,
+    files: Vec<PathBuf>,
 }
 
 /// A shape with its place.
@@ -81,9 +82,11 @@ impl Assets {
         });
         let mut warnings: Vec<Problem> = media(&shapes).into_iter().collect();
         let mut members = Vec::with_capacity(shapes.len());
+        let mut files = BTreeSet::new();
         for (Planned { properties, space }, result) in shapes.iter().zip(results) {
             if let Some(shape) = problems.take(result) {
                 warnings.extend(shape.warnings);
+                files.extend(shape.files);
                 members.push(Member {
                     node: properties.node_id(),
                     group: space.group,
@@ -97,12 +100,18 @@ impl Assets {
             shapes: members,
             instances,
             warnings,
+            files: files.into_iter().collect(),
         })
     }
 
     /// What the user should know of the files.
     pub fn warnings(&self) -> &[Problem] {
         &self.warnings
+    }
+
+    /// The files that were read, or tried, because files of the scene name them; sorted.
+    pub fn files(&self) -> &[PathBuf] {
+        &self.files
     }
 
     /// Triangles and other primitives.

@@ -334,5 +334,6 @@ pub(super) fn place_file(
 ) -> Result<Shape> {
     let mut shape = place_in(setting, loaded.mesh, properties)?;
     shape.warnings.splice(0..0, loaded.warnings);
+    shape.files = loaded.files;
     Ok(shape)
 }

@@ -21,7 +21,7 @@ mod serialized;
 mod stl;
 mod triangle;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use glam::{DAffine3, DMat3, DMat4, DVec3, Vec2, Vec3};
 
@@ -222,6 +222,8 @@ pub struct Shape {
     pub geometry: Geometry,
     /// What the user should know of its file.
     pub warnings: Vec<Problem>,
+    /// The files that its file names and that were read for it, or tried.
+    pub files: Vec<PathBuf>,
 }
 
 impl From<Geometry> for Shape {
@@ -229,6 +231,7 @@ impl From<Geometry> for Shape {
         Self {
             geometry,
             warnings: Vec::new(),
+            files: Vec::new(),
         }
     }
 }

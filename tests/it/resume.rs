@@ -191,3 +191,132 @@ fn a_time_limit_is_no_failure_and_can_be_continued() {
         "{said}"
     );
 }
+
+/// A scene of everything that is read from files, made in a folder, and for each of the files another content.
+fn scene_of_files(place: &Place) -> Vec<(&'static str, Vec<u8>)> {
+    const PLY: &str = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n\
+        property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n\
+        0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+    const STL: &str = "solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\n\
+        endfacet\nendsolid\n";
+    // The second buffer, which nothing needs, names the file that names it.
+    const GLTF: &str = r#"{"asset":{"version":"2.0"},"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],
+        "meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],
+        "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"}],
+        "bufferViews":[{"buffer":0,"byteLength":36}],
+        "buffers":[{"byteLength":36,"uri":"a%20buffer.bin"},{"byteLength":4,"uri":"loop.gltf"}]}"#;
+    const LOOP: &str =
+        r#"{"buffers":[{"byteLength":4,"uri":"mesh.gltf"},{"byteLength":4,"uri":"loop.gltf"}]}"#;
+    const SHAPES: &str = r#"<shape type="ply"><string name="filename" value="mesh.ply"/><ref id="textured"/></shape>
+        <shape type="stl"><string name="filename" value="mesh.stl"/></shape>
+        <shape type="obj"><string name="filename" value="mesh.obj"/><boolean name="materials" value="true"/></shape>
+        <shape type="gltf"><string name="filename" value="mesh.gltf"/></shape>
+        <shape type="sphere"><bsdf type="diffuse"><spectrum name="reflectance" filename="curve.spd"/></bsdf></shape>
+        <emitter type="envmap"><string name="filename" value="sky.png"/></emitter>"#;
+    const MATERIALS: &str = r#"<bsdf type="diffuse" id="textured"><texture type="bitmap" name="reflectance">
+        <string name="filename" value="picture.png"/></texture></bsdf>"#;
+    let document = |text: &str| format!(r#"<scene version="3.0.0">{text}</scene>"#).into_bytes();
+    let floats = |last: f32| -> Vec<u8> {
+        let numbers = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, last, 0.0_f32];
+        numbers.iter().flat_map(|x| x.to_le_bytes()).collect()
+    };
+    let picture = |code: u8| {
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        let pixels = ::image::RgbImage::from_pixel(4, 4, ::image::Rgb([code; 3]));
+        pixels
+            .write_to(&mut bytes, ::image::ImageFormat::Png)
+            .unwrap();
+        bytes.into_inner()
+    };
+    let text = |text: &str| text.as_bytes().to_vec();
+    let obj = "mtllib mesh.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n";
+    let files = [
+        ("mesh.ply", text(PLY), text(&PLY.replace("0 1 0", "0 2 0"))),
+        ("mesh.stl", text(STL), text(&STL.replace("0 1 0", "0 2 0"))),
+        ("mesh.obj", text(obj), text(&obj.replace("0 1 0", "0 2 0"))),
+        (
+            "mesh.mtl",
+            text("newmtl a\nKd 1 0 0\n"),
+            text("newmtl a\nKd 0 1 0\n"),
+        ),
+        ("mesh.gltf", text(GLTF), text(&GLTF.replace("[0]", "[ 0 ]"))),
+        ("loop.gltf", text(LOOP), text(&LOOP.replace(":4", ": 4"))),
+        ("a buffer.bin", floats(1.0), floats(2.0)),
+        (
+            "curve.spd",
+            text("400 0.5\n700 0.5\n"),
+            text("400 0.5\n700 0.4\n"),
+        ),
+        ("picture.png", picture(100), picture(101)),
+        ("sky.png", picture(100), picture(101)),
+        (
+            "materials.xml",
+            document(MATERIALS),
+            document(&MATERIALS.replace("<bsdf", "<bsdf   ")),
+        ),
+        (
+            "shapes.xml",
+            document(r#"<include filename="deep.xml"/>"#),
+            document(""),
+        ),
+        (
+            "deep.xml",
+            document(SHAPES),
+            document(&SHAPES.replace("sphere", "disk")),
+        ),
+    ];
+    let includes = r#"<include filename="materials.xml"/><include filename="shapes.xml"/></scene>"#;
+    let scene = SCENE
+        .replace(r#"<emitter type="constant"/>"#, "")
+        .replace("</scene>", includes);
+    fs::write(place.path("scene.xml"), scene).unwrap();
+    let mut others = Vec::new();
+    for (name, content, other) in files {
+        fs::write(place.path(name), content).unwrap();
+        others.push((name, other));
+    }
+    others
+}
+
+#[test]
+fn a_change_of_any_file_that_the_scene_reads_is_named_and_nothing_is_resumed() {
+    let place = Place::new();
+    let others = scene_of_files(&place);
+    let arguments = [
+        "-o",
+        "a.exr",
+        "--json",
+        "--time-limit",
+        "0.2",
+        "--spp",
+        "100000",
+        "--checkpoint",
+        "100",
+    ];
+    let first = place.run(&arguments);
+    assert_eq!(object(&first)["status"], "time limit");
+    let resumed = [&arguments[..], &["--resume"]].concat();
+    for (name, other) in others {
+        let whole = fs::read(place.path(name)).unwrap();
+        fs::write(place.path(name), other).unwrap();
+        let output = place.run(&resumed);
+        let said = String::from_utf8_lossy(&output.stderr);
+        if name == "materials.xml" {
+            // Blanks in a scene file change nothing.
+            assert!(output.status.success(), "{said}");
+        } else {
+            assert_eq!(output.status.code(), Some(1), "{name}: {said}");
+            assert!(
+                said.contains("cannot be continued") && said.contains(name),
+                "{name}: {said}"
+            );
+        }
+        fs::write(place.path(name), whole).unwrap();
+    }
+    fs::remove_file(place.path("mesh.mtl")).unwrap();
+    let said = String::from_utf8_lossy(&place.run(&resumed).stderr).into_owned();
+    assert!(
+        said.contains("cannot be continued") && said.contains("mesh.mtl"),
+        "{said}"
+    );
+}

@@ -56,6 +56,8 @@ pub(super) struct Reader<'o> {
     bytes: u64,
     /// The files being read, outermost first, each with the place that asked for it.
     open_files: Vec<(PathBuf, Location)>,
+    /// The texts that were read, the scene first.
+    sources: Vec<PathBuf>,
 }
 
 impl<'o> Reader<'o> {
@@ -75,6 +77,7 @@ impl<'o> Reader<'o> {
             includes: 0,
             bytes: 0,
             open_files: Vec::new(),
+            sources: Vec::new(),
         }
     }
 
@@ -88,6 +91,7 @@ impl<'o> Reader<'o> {
     pub(super) fn scene(mut self, text: &str, path: &Path) -> Result<Description> {
         self.open_files
             .push((structure::canonical(path), Location::of_file(path)));
+        self.sources.push(path.to_owned());
         let scope = self.scopes.open(path, Scopes::WORKING_DIRECTORY);
         self.document(text, path, scope, None)?;
         let mut report = std::mem::take(&mut self.report);
@@ -119,6 +123,7 @@ impl<'o> Reader<'o> {
             nodes: self.nodes,
             scopes: self.scopes,
             warnings: self.warnings,
+            sources: self.sources,
             strict: self.options.strict,
         })
     }

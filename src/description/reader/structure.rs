@@ -67,6 +67,7 @@ impl Reader<'_> {
     /// The text of a further file, as long as all together stay within bounds.
     pub(super) fn text(&mut self, path: &Path) -> Result<String> {
         let text = self.read_text(path)?;
+        self.sources.push(path.to_owned());
         self.bytes += text.len() as u64;
         if self.bytes > xml::MAX_BYTES {
             let limit = xml::MAX_BYTES >> 20;

@@ -16,7 +16,7 @@ mod stage;
 mod tests;
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use glam::DMat4;
 
@@ -108,6 +108,7 @@ pub fn read_gltf(path: &Path, options: &ReadOptions) -> Result<GltfScene> {
             mesh,
             dropped_triangles,
             warnings,
+            ..
         } = Decoded {
             mesh: part.mesh,
             ..Decoded::default()
@@ -144,6 +145,7 @@ pub(super) fn read(input: Input<'_>, options: &ReadOptions) -> Result<Decoded> {
     Ok(Decoded {
         mesh,
         warnings: walk.notes.told(),
+        files: walk.files,
         ..Decoded::default()
     })
 }
@@ -185,6 +187,8 @@ struct Walk {
     parts: Vec<GltfPart>,
     camera: Option<GltfCamera>,
     notes: Notes,
+    /// The files of buffers.
+    files: Vec<PathBuf>,
     /// Vertices and corners so far.
     size: usize,
 }
@@ -210,6 +214,7 @@ fn walk(input: Input<'_>, options: &ReadOptions) -> Result<Walk> {
             walk.node(placed, &stage, &accessors)?;
         }
         walk.color();
+        walk.files = buffers.files;
         if options.flip_tex_coords.unwrap_or(false) {
             for part in &mut walk.parts {
                 part.mesh.flip_uvs();

@@ -9,7 +9,7 @@ mod blocks;
 mod piece;
 
 use std::collections::HashMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use glam::{Vec2, Vec3};
 
@@ -52,10 +52,12 @@ fn read_in(cuts: Cuts, input: Input<'_>, options: &ReadOptions) -> Result<Decode
     if let Some(FaceColors {
         attribute,
         warnings,
+        files,
     }) = colors
     {
         decoded.mesh.attributes.extend(attribute);
         decoded.warnings.extend(warnings);
+        decoded.files = files;
     }
     Ok(decoded)
 }
@@ -111,6 +113,8 @@ struct FaceColors {
     /// `None`: no face has a colour.
     attribute: Option<Attribute>,
     warnings: Vec<String>,
+    /// The libraries.
+    files: Vec<PathBuf>,
 }
 
 impl Obj {
@@ -212,6 +216,7 @@ impl Obj {
         FaceColors {
             attribute,
             warnings,
+            files: materials.libraries,
         }
     }
 
@@ -287,6 +292,7 @@ impl Obj {
             mesh,
             warnings,
             polygons: self.polygons,
+            ..Decoded::default()
         }
     }
 }
