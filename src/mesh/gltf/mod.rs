@@ -9,6 +9,7 @@ mod json;
 mod accessor;
 mod container;
 mod material;
+mod places;
 mod primitive;
 mod skin;
 mod stage;
@@ -25,10 +26,11 @@ use super::{Attribute, Mesh, Per};
 use crate::error::{Error, Location, Problem, Result};
 use accessor::Accessors;
 use container::{Buffers, Container};
-use json::{Instancing, Primitive, Root, at};
+use json::{Primitive, Root, at};
 use material::Coordinates;
-use primitive::{Mode, Recipe};
-use stage::{Placed, Stage, placement};
+use places::Places;
+use primitive::{Mode, Recipe, Size};
+use stage::{Placed, Stage};
 
 /// A glTF scene.
 #[derive(Clone, Debug, Default)]
@@ -153,32 +155,46 @@ pub(super) fn read(input: Input<'_>, options: &ReadOptions) -> Result<Decoded> {
 /// What is left out of a file: told once for each kind.
 #[derive(Default)]
 struct Notes {
-    counts: BTreeMap<String, usize>,
+    counts: BTreeMap<&'static str, usize>,
+    /// Names of vertex data.
+    unread: BTreeSet<String>,
     /// Of materials.
     unseen: BTreeSet<String>,
 }
 
 impl Notes {
-    fn add(&mut self, message: impl Into<String>) {
-        *self.counts.entry(message.into()).or_default() += 1;
+    fn add(&mut self, message: &'static str) {
+        *self.counts.entry(message).or_default() += 1;
     }
 
     fn told(self) -> Vec<String> {
         let mut told: Vec<String> = (self.counts.into_iter())
             .map(|(message, count)| match count {
-                1 => message,
+                1 => message.to_owned(),
                 _ => format!("{message} ({count} times)"),
             })
             .collect();
-        if !self.unseen.is_empty() {
-            let unseen: Vec<String> = self.unseen.into_iter().collect();
-            let unseen = unseen.join(", ");
+        if let Some(names) = listed(&self.unread) {
+            told.push(format!("vertex data left out: {names}"));
+        }
+        if let Some(names) = listed(&self.unseen) {
             told.push(format!(
-                "materials are shown by their base colour factor alone, without {unseen}"
+                "materials are shown by their base colour factor alone, without {names}"
             ));
         }
         told
     }
+}
+
+/// The first names of some; `None` where there are none.
+fn listed(names: &BTreeSet<String>) -> Option<String> {
+    const SHOWN: usize = 8;
+    let shown: Vec<&str> = names.iter().take(SHOWN).map(String::as_str).collect();
+    let more = match names.len().saturating_sub(SHOWN) {
+        0 => String::new(),
+        more => format!(" and {more} more"),
+    };
+    (!shown.is_empty()).then(|| shown.join(", ") + &more)
 }
 
 /// What was found on the way through the nodes.
@@ -238,7 +254,7 @@ impl Walk {
         let mesh = at(&accessors.root.meshes, index, "mesh")?;
         let name = placed.node.name.as_ref().or(mesh.name.as_ref());
         let weights = placed.node.weights.as_ref().unwrap_or(&mesh.weights);
-        let places = places(placed, accessors)?;
+        let places = Places::of(placed, accessors)?;
         for (i, primitive) in mesh.primitives.iter().enumerate() {
             let own = Own {
                 primitive,
@@ -280,16 +296,19 @@ impl Walk {
             base_color,
         };
         recipe.check_compression()?;
-        let Some(size) = recipe.size()? else {
+        let Some(Size { vertices, corners }) = recipe.size()? else {
             self.notes.add("primitives without positions are left out");
             return Ok(None);
         };
+        if matches!(mode, Mode::List) && corners % 3 != 0 {
+            (self.notes).add("corners after a primitive's last whole triangle are left out");
+        }
         if let Some(material) = material {
             material.note_unseen(&mut self.notes.unseen);
         }
-        for name in recipe.unread() {
-            self.notes.add(format!("vertex data {name} are left out"));
-        }
+        let unread = recipe.unread().map(str::to_owned);
+        self.notes.unread.extend(unread);
+        let size = vertices.saturating_add(corners);
         self.size = (self.size).saturating_add(size.saturating_mul(own.places.len()));
         if self.size > MOST {
             return Err(format!(
@@ -306,7 +325,7 @@ impl Walk {
                 &stage.world,
             )?;
         } else {
-            mesh = placed_at(mesh, own.places);
+            mesh = own.places.put(mesh);
         }
         Ok(Some(GltfPart {
             mesh,
@@ -349,66 +368,5 @@ struct Own<'a> {
     primitive: &'a Primitive,
     /// Of the morph targets.
     weights: &'a [f32],
-    places: &'a [DMat4],
-}
-
-/// Where a node's mesh stands: in the node's place, or by EXT_mesh_gpu_instancing in several relative to it.
-fn places(placed: &Placed<'_>, accessors: &Accessors<'_>) -> OrWhy<Vec<DMat4>> {
-    let Placed { node, to_world } = placed;
-    let Some(Instancing { attributes }) = &node.extensions.instancing else {
-        return Ok(vec![*to_world]);
-    };
-    fn rows<const N: usize>(
-        attribute: Option<&usize>,
-        accessors: &Accessors<'_>,
-    ) -> OrWhy<Option<Vec<[f64; N]>>> {
-        let rows = attribute.map(|&index| accessors.rows::<N>(index));
-        let rows = rows.transpose()?;
-        Ok(rows.map(|rows| rows.into_iter().map(|row| row.map(f64::from)).collect()))
-    }
-    let translations = rows::<3>(attributes.get("TRANSLATION"), accessors)?;
-    let rotations = rows::<4>(attributes.get("ROTATION"), accessors)?;
-    let scales = rows::<3>(attributes.get("SCALE"), accessors)?;
-    let counts = [
-        translations.as_ref().map(Vec::len),
-        rotations.as_ref().map(Vec::len),
-        scales.as_ref().map(Vec::len),
-    ];
-    let mut counts = counts.into_iter().flatten();
-    let count = counts.next().unwrap_or(0);
-    if counts.any(|other| other != count) {
-        return Err(
-            "the instances of a node have translations, rotations and scales of different counts"
-                .to_owned(),
-        );
-    }
-    let place = |i: usize| {
-        let instance = placement(
-            translations.as_ref().map(|rows| rows[i]),
-            rotations.as_ref().map(|rows| rows[i]),
-            scales.as_ref().map(|rows| rows[i]),
-        );
-        *to_world * instance
-    };
-    Ok((0..count).map(place).collect())
-}
-
-/// A mesh in all of its places.
-fn placed_at(mesh: Mesh, places: &[DMat4]) -> Mesh {
-    let place = |mut mesh: Mesh, to_world: &DMat4| {
-        mesh.transform(to_world);
-        if to_world.determinant() < 0.0 {
-            mesh.triangles.iter_mut().for_each(|t| t.swap(1, 2));
-        }
-        mesh
-    };
-    let Some((last, others)) = places.split_last() else {
-        return Mesh::default();
-    };
-    let mut all = Mesh::default();
-    for to_world in others {
-        all.append(place(mesh.clone(), to_world));
-    }
-    all.append(place(mesh, last));
-    all
+    places: &'a Places,
 }

@@ -21,6 +21,13 @@ pub(super) struct Recipe<'a> {
     pub(super) base_color: [f32; 4],
 }
 
+/// How large a primitive is.
+pub(super) struct Size {
+    pub(super) vertices: usize,
+    /// Indices, or vertices where there are none.
+    pub(super) corners: usize,
+}
+
 /// How vertices become triangles.
 #[derive(Clone, Copy)]
 pub(super) enum Mode {
@@ -43,8 +50,8 @@ impl Mode {
 }
 
 impl Recipe<'_> {
-    /// How many vertices and corners there will be; `None` where it has no positions.
-    pub(super) fn size(&self) -> OrWhy<Option<usize>> {
+    /// How large the mesh will be; `None` where the primitive has no positions.
+    pub(super) fn size(&self) -> OrWhy<Option<Size>> {
         let Some(&positions) = self.primitive.attributes.get("POSITION") else {
             return Ok(None);
         };
@@ -53,7 +60,7 @@ impl Recipe<'_> {
             Some(indices) => self.accessors.count(indices)?,
             None => vertices,
         };
-        Ok(Some(vertices.saturating_add(corners)))
+        Ok(Some(Size { vertices, corners }))
     }
 
     /// The mesh in its own space; where the primitive has colours, they are times the base colour its attribute
