@@ -1,10 +1,14 @@
 //! What every light must do, and Mitsuba's numbers for those that look at an image.
 
+use std::sync::Arc;
+
 use super::*;
 use crate::color::{Rgb, Samples};
 use crate::description::{Description, Kind, Options};
 use crate::image::{self, Image, Metadata};
+use crate::interaction::{Hit, Ray};
 use crate::math::{random, warp};
+use crate::shape::Geometry;
 
 /// An image of `width` × 3 texels of `value`, in a folder of its own.
 struct Pictures(tempfile::TempDir);
@@ -194,5 +198,108 @@ fn spots_and_projectors_throw_what_mitsuba_s_do() {
                 "{text} {p:?}: {ours} {red}"
             );
         }
+    }
+}
+
+/// Every light of the family.
+fn every_light(pictures: &Pictures) -> Vec<(&'static str, Light<Rgb>, Arc<Geometry>)> {
+    pictures.add("any.exr", 4, |x, y| [(1 + x + y) as f32; 3]);
+    let text = "<scene version='3.0.0'><shape type='sphere'><point name='center' value='0, 0, 3'/></shape></scene>";
+    let scene = Description::parse(text, "test.xml".as_ref(), &Options::default()).unwrap();
+    let shape = crate::shape::build(&scene.root().children(Kind::Shape)[0]).unwrap();
+    let shape = Arc::new(shape.geometry);
+    let example = |name: &str| match name {
+        "envmap" => "<string name='filename' value='any.exr'/>",
+        "projector" => {
+            "<texture name='irradiance' type='bitmap'><string name='filename' value='any.exr'/></texture>"
+        }
+        "spot" => "<float name='cutoff_angle' value='60'/>",
+        _ => "",
+    };
+    let palettes = Palettes::new(Rgb);
+    let light = |name: &&'static str| {
+        let text = format!(
+            "<scene version='3.0.0'><emitter type='{name}'>{}</emitter></scene>",
+            example(name)
+        );
+        let path = pictures.0.path().join("test.xml");
+        let scene = Description::parse(&text, &path, &Options::default()).unwrap();
+        let context = LightContext {
+            palettes: &palettes,
+            shape: (*name == "area").then_some(&shape),
+        };
+        let light = Light::build(&scene.root().children(Kind::Emitter)[0], &context);
+        (
+            *name,
+            light.unwrap_or_else(|e| panic!("{e}")),
+            shape.clone(),
+        )
+    };
+    Light::<Rgb>::NAMES.iter().map(light).collect()
+}
+
+#[test]
+fn every_light_is_drawn_with_the_density_and_the_radiance_that_it_has_there() {
+    let from = Vec3::new(0.2, -0.1, 1.0);
+    for (name, light, shape) in every_light(&Pictures::new()) {
+        assert_eq!(light.is_ambient(), light.power(&Rgb, 10.0) == 0.0, "{name}");
+        let mut drawn = 0;
+        for i in 0..500 {
+            let Some(sample) = light.sample(from, point(3, i), &()) else {
+                continue;
+            };
+            drawn += 1;
+            assert!((sample.direction.length() - 1.0).abs() < 1e-5, "{name}");
+            assert!(
+                sample.pdf > 0.0 && sample.pdf.is_finite(),
+                "{name}: {}",
+                sample.pdf
+            );
+            assert!(
+                sample.radiance[0] >= 0.0 && sample.radiance[0].is_finite(),
+                "{name}"
+            );
+            if let Some(target) = sample.target {
+                let way = (target - from).normalize();
+                assert!(way.distance(sample.direction) < 1e-4, "{name}");
+            }
+            let (density, radiance) = if light.is_environment() {
+                let radiance = light.environment_radiance(sample.direction, &());
+                (light.environment_pdf(sample.direction), radiance)
+            } else if sample.delta {
+                (1.0, sample.radiance)
+            } else {
+                let ray = Ray {
+                    origin: from,
+                    direction: sample.direction,
+                    t_max: f32::INFINITY,
+                    time: 0.0,
+                };
+                let Some((t, u, v)) = shape.intersect(0, &ray) else {
+                    continue; // at the rim
+                };
+                let hit = Hit {
+                    t,
+                    u,
+                    v,
+                    ..Hit::miss(t)
+                };
+                let at = shape.interaction(&ray, &hit);
+                (
+                    light.surface_pdf(from, &at),
+                    light.surface_radiance(&at, &()),
+                )
+            };
+            assert!(
+                (density / sample.pdf - 1.0).abs() < 2e-3,
+                "{name}: {density} {}",
+                sample.pdf
+            );
+            assert!(
+                (radiance[0] / sample.radiance[0] - 1.0).abs() < 2e-2,
+                "{name}"
+            );
+        }
+        assert_eq!(drawn == 0, light.is_ambient(), "{name}");
     }
 }

@@ -119,3 +119,64 @@ impl Mount {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::description::declared::Preset;
+    use crate::description::{Description, Options};
+
+    /// Every sensor of the family, with the least that it needs.
+    fn every_sensor(film: &Film) -> impl Iterator<Item = (&'static str, Sensor)> {
+        Sensor::PLUGINS.iter().map(|(name, plugin)| {
+            let required = plugin.rows().filter(|row| row.preset == Preset::Required);
+            let needs: String = required
+                .map(|row| format!("<float name='{}' value='{}'/>", row.name, row.range.least))
+                .collect();
+            let text = format!(
+                "<scene version='3.0.0'><sensor type='{name}'>{needs}<float name='near_clip' value='0.5'/>
+                <transform name='to_world'><lookat origin='1,2,3' target='4,0,1' up='0,0,1'/></transform></sensor></scene>"
+            );
+            let scene = Description::parse(&text, Path::new("test.xml"), &Options::default());
+            let sensor = Sensor::build(&scene.unwrap().root().children(Kind::Sensor)[0], film);
+            (*name, sensor.unwrap())
+        })
+    }
+
+    #[test]
+    fn every_sensor_s_rays_go_from_near_to_far_where_its_projection_puts_them() {
+        let film = Film {
+            width: 200,
+            height: 100,
+            ..Film::default()
+        };
+        for (name, sensor) in every_sensor(&film) {
+            for (x, y) in [(0.5, 0.5), (0.8, 0.3), (0.01, 0.99)] {
+                let ray = sensor.ray(Vec2::new(x, y), Vec2::splat(0.5), 0.0);
+                assert!((ray.direction.length() - 1.0).abs() < 1e-5, "{name}");
+                for (t, depth) in [(0.0, 0.0), (ray.t_max, 1.0)] {
+                    let world = ray.at(t).extend(1.0);
+                    let clip = sensor.projection() * sensor.world_to_camera() * world;
+                    let found = clip.truncate() / clip.w;
+                    let expected = Vec3::new(2.0 * x - 1.0, 1.0 - 2.0 * y, depth);
+                    assert!(
+                        (found - expected).length() < 3e-3,
+                        "{name}: {found} {expected}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn every_sensor_without_a_lens_ignores_the_place_on_it() {
+        for (name, sensor) in every_sensor(&Film::default()) {
+            let through = |lens| sensor.ray(Vec2::new(0.3, 0.6), lens, 0.0);
+            let same = through(Vec2::new(0.1, 0.2)) == through(Vec2::new(0.9, 0.4));
+            // An aperture of radius 0 is no lens either.
+            assert!(same, "{name}");
+        }
+    }
+}

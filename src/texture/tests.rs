@@ -202,3 +202,77 @@ fn what_is_wrong_with_a_spectrum_is_told() {
         assert!(message.contains(part), "{message}");
     }
 }
+
+/// Every texture of the family, one that is not the same everywhere where it can vary.
+fn every_texture<C: ColorModel>(color: &C) -> Vec<(&'static str, Texture<C>)> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("i.exr");
+    let mut image = crate::image::Image::new(5, 4, ["R", "G", "B"].map(String::from).to_vec());
+    for (x, y) in (0..4).flat_map(|y| (0..5).map(move |x| (x, y))) {
+        for c in 0..3 {
+            image.set(x, y, c, ((x * 7 + y * 3) % 5) as f32 / 5.0);
+        }
+    }
+    crate::image::write(&path, &image, &Default::default()).unwrap();
+    let example = |name: &str| {
+        match name {
+        "bitmap" => format!("<string name='filename' value='{}'/>", path.display()),
+        "blackbody" => "<float name='temperature' value='4000'/>".to_owned(),
+        "irregular" => "<string name='wavelengths' value='400, 500, 600'/><string name='values' value='0.1, 0.3, 0.2'/>".to_owned(),
+        "mesh_attribute" => "<string name='name' value='vertex_color'/>".to_owned(),
+        "rawconstant" => "<float name='value' value='0.3'/>".to_owned(),
+        "regular" => "<float name='wavelength_min' value='400'/><float name='wavelength_max' value='700'/><string name='values' value='0.1, 0.3'/>".to_owned(),
+        "srgb" => "<rgb name='color' value='0.2, 0.4, 0.1'/>".to_owned(),
+        "zoneplate" => "<float name='rings' value='2'/>".to_owned(),
+        "checkerboard" | "d65" | "uniform" => String::new(),
+        other => panic!("give {other} an example"),
+    }
+    };
+    let names = Texture::<C>::NAMES.iter();
+    names
+        .map(|name| {
+            let text = format!("<texture type='{name}'>{}</texture>", example(name));
+            let palette = Palette::new(color.clone());
+            (
+                *name,
+                built(&text, &palette, Role::Quantity).unwrap_or_else(|e| panic!("{e}")),
+            )
+        })
+        .collect()
+}
+
+#[test]
+fn every_texture_is_finite_changes_as_its_gradient_says_and_is_constant_where_it_says() {
+    let at = |u: f32, v: f32| Interaction::at_uv(Vec2::new(u, v));
+    for (name, texture) in every_texture(&Rgb) {
+        let value = |u, v| texture.eval(&at(u, v), &())[0];
+        for (u, v) in [(0.13, 0.29), (0.31, 0.77), (0.83, 0.41), (-2.2, 7.6)] {
+            let here = value(u, v);
+            assert!(here.is_finite() && here >= 0.0, "{name}: {here}");
+            if texture.constant().is_some() {
+                assert_eq!(here, value(0.0, 0.0), "{name}");
+            }
+            let h = 2e-3;
+            let slopes = texture.gradient(&at(u, v), &()).map(|slope| slope[0]);
+            let expected = [
+                (value(u + h, v) - value(u - h, v)) / (2.0 * h),
+                (value(u, v + h) - value(u, v - h)) / (2.0 * h),
+            ];
+            for (slope, expected) in slopes.into_iter().zip(expected) {
+                let tolerance = 0.05 * (1.0 + expected.abs());
+                assert!(
+                    (slope - expected).abs() < tolerance,
+                    "{name}: {slope} {expected}"
+                );
+            }
+        }
+        assert!(texture.resolution() != [0, 0], "{name}");
+    }
+}
+
+#[test]
+fn every_texture_is_made_in_every_colour_model() {
+    let bands = Bands::<8>::new(8).unwrap();
+    assert_eq!(every_texture(&bands).len(), Texture::<Rgb>::NAMES.len());
+    assert_eq!(every_texture(&Mono).len(), Texture::<Rgb>::NAMES.len());
+}
