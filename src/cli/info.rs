@@ -64,7 +64,11 @@ fn info(arguments: &Arguments, input: &Path) -> Result<Value> {
     } else if is_mesh {
         mesh_file(arguments, input)
     } else {
-        Ok(picture(&image::read(input, &Limits::default())?))
+        let read = image::read(input, &Limits::default())?;
+        if !arguments.quiet {
+            report::warnings(&read.warnings);
+        }
+        Ok(picture(&read))
     }
 }
 

@@ -10,11 +10,13 @@ pub mod upsample;
 mod bands;
 mod model;
 mod mono;
+mod primaries;
 mod rgb;
 mod samples;
 
 pub use bands::Bands;
 pub use model::{Color, ColorModel, Role, luminance, rgb_to_xyz, xyz_to_rgb};
 pub use mono::Mono;
+pub use primaries::Primaries;
 pub use rgb::Rgb;
 pub use samples::{Samples, Spectral};

@@ -1,6 +1,7 @@
 //! What of a picture is compared: its main colour or a layer by name, whole or in a window. Two layers can
 //! be compared where they have the same size and channels, and are made to hold values of one kind.
 
+use std::borrow::Cow;
 use std::path::Path;
 
 use serde::Serialize;
@@ -82,10 +83,13 @@ impl Layer {
     /// # Errors
     /// Where the picture lacks what is selected.
     pub fn of(picture: &Picture, selection: &Selection) -> Result<Self> {
-        let image = &picture.image;
+        let image = match &selection.layer {
+            Some(_) => Cow::Borrowed(&picture.image),
+            None => picture.image.in_rgb(),
+        };
         let chosen = match &selection.layer {
-            Some(name) => named(image, name)?,
-            None => main_color(image)?,
+            Some(name) => named(&image, name)?,
+            None => main_color(&image)?,
         };
         let view = match selection.crop {
             None => image.view(),
@@ -206,7 +210,7 @@ struct Chosen {
 fn main_color(image: &Image) -> Result<Chosen> {
     let Some(rgb) = image.rgb() else {
         return Err(Error::input(format!(
-            "the image has no R, G, B or Y but {}",
+            "the image has no R, G, B, no X, Y, Z and no Y but {}",
             image.channels().join(", ")
         ))
         .help("--layer NAME chooses other channels"));
@@ -267,6 +271,7 @@ mod tests {
             image: Image::from_data(2, 2, names, data).unwrap(),
             encoding,
             metadata: Vec::new(),
+            warnings: Vec::new(),
         }
     }
 

@@ -30,8 +30,9 @@ pub fn decode_value(code: u8) -> f32 {
 /// The codes of an image's main colour, and of its straight opacity if it has a channel A.
 ///
 /// # Errors
-/// Where the image has neither R, G, B nor Y, or no pixels.
+/// Where the image has neither R, G, B nor X, Y, Z nor Y, or no pixels.
 pub fn encode(image: &Image) -> Result<Codes> {
+    let image = &*image.in_rgb();
     let Some(rgb) = image.rgb() else {
         return Err(Error::input("a display image needs channels R, G, B or Y")
             .help("write EXR, which takes any channels"));

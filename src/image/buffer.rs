@@ -1,6 +1,9 @@
 //! The image buffer: width × height pixels of named f32 channels, interleaved, so that sample (x, y, c)
 //! lies at (y·width + x)·channels + c. Views give it other strides without a copy.
 
+use std::borrow::Cow;
+
+use crate::color::Primaries;
 use crate::error::{Error, Result};
 use crate::image::View;
 
@@ -155,24 +158,62 @@ impl Image {
         self.channels.iter().position(|c| c == name)
     }
 
-    /// The indices of the main red, green and blue channels: those named R, G and B, else those of the
-    /// first layer that has all three, else three times the luminance Y of a grey image.
+    /// The indices of the main red, green and blue channels: those named R, G and B, else three times the luminance
+    /// Y of a grey image, else those of the first layer that has either.
     pub fn rgb(&self) -> Option<[usize; 3]> {
-        let of_layer = |prefix: &str| {
-            let [r, g, b] = ["R", "G", "B"].map(|c| self.channel(&format!("{prefix}{c}")));
+        let find = |prefix: &str, name: &str| self.channel(&format!("{prefix}{name}"));
+        let color = |prefix: &str| {
+            let [r, g, b] = ["R", "G", "B"].map(|name| find(prefix, name));
             Some([r?, g?, b?])
         };
-        let grey = || {
-            // Beside X and Z, Y is a coordinate of XYZ and no grey.
-            let y = self.channel("Y")?;
-            (self.channel("X").is_none() && self.channel("Z").is_none()).then_some([y; 3])
+        let grey = |prefix: &str| {
+            // Beside X and Z, Y is a coordinate and no grey.
+            let [x, y, z] = ["X", "Y", "Z"].map(|name| find(prefix, name));
+            (x.is_none() && z.is_none()).then_some([y?; 3])
         };
-        of_layer("").or_else(grey).or_else(|| {
-            self.channels
-                .iter()
-                .filter_map(|name| name.strip_suffix('R').filter(|p| p.ends_with('.')))
-                .find_map(of_layer)
-        })
+        let layer = |name: &str| {
+            let (prefix, _) = name.split_at(name.rfind('.')? + 1);
+            color(prefix).or_else(|| grey(prefix))
+        };
+        color("")
+            .or_else(|| grey(""))
+            .or_else(|| self.channels.iter().find_map(|name| layer(name)))
+    }
+
+    /// The image with a main colour X, Y, Z (CIE 1931) as R, G, B of BT.709 in their place; itself where it has none, or
+    /// has a red, green and blue already.
+    #[must_use]
+    pub fn into_rgb(mut self) -> Self {
+        if let Some([x, y, z]) = self.xyz() {
+            let to_rgb = Primaries::XYZ.to_bt709().expect("XYZ is a space");
+            for pixel in self.data.chunks_exact_mut(self.channels.len()) {
+                [pixel[x], pixel[y], pixel[z]] = to_rgb([pixel[x], pixel[y], pixel[z]]);
+            }
+            for (c, name) in [(x, "R"), (y, "G"), (z, "B")] {
+                self.rename(c, name.into());
+            }
+        }
+        self
+    }
+
+    /// As [`Image::into_rgb`], without a copy where there is nothing to change.
+    pub fn in_rgb(&self) -> Cow<'_, Self> {
+        match self.xyz() {
+            Some(_) => Cow::Owned(self.clone().into_rgb()),
+            None => Cow::Borrowed(self),
+        }
+    }
+
+    /// The indices of X, Y and Z, where those are the main colour.
+    pub fn xyz(&self) -> Option<[usize; 3]> {
+        let [x, y, z] = ["X", "Y", "Z"].map(|name| self.channel(name));
+        let found = [x?, y?, z?];
+        self.channel("R").is_none().then_some(found)
+    }
+
+    /// Gives channel `c` another name.
+    pub(super) fn rename(&mut self, c: usize, name: String) {
+        self.channels[c] = name;
     }
 
     /// The index of the main opacity channel, A.

@@ -46,22 +46,32 @@ impl Format {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Decoder {
     Exr,
+    Hdr,
+    Jpeg,
+    Pfm,
     Raster(ImageFormat),
 }
 
 impl Decoder {
     pub(super) fn of_input(path: &Path, bytes: &[u8]) -> Result<Self> {
-        let marks: [(&[u8], Decoder); 5] = [
+        let marks: [(&[u8], Decoder); 7] = [
             (&openexr::MAGIC, Self::Exr),
             (b"\x89PNG\r\n\x1a\n", Self::Raster(ImageFormat::Png)),
-            (b"\xff\xd8\xff", Self::Raster(ImageFormat::Jpeg)),
+            (b"\xff\xd8\xff", Self::Jpeg),
             (b"BM", Self::Raster(ImageFormat::Bmp)),
-            (b"#?", Self::Raster(ImageFormat::Hdr)),
+            (b"#?", Self::Hdr),
+            (b"PF", Self::Pfm),
+            (b"Pf", Self::Pfm),
         ];
         for (mark, decoder) in marks {
             if bytes.starts_with(mark) {
                 return Ok(decoder);
             }
+        }
+        if let [b'P', b'1'..=b'7', space, ..] = bytes
+            && (space.is_ascii_whitespace() || *space == b'#')
+        {
+            return Ok(Self::Raster(ImageFormat::Pnm));
         }
         if extension(path) == "tga" {
             return Ok(Self::Raster(ImageFormat::Tga));
@@ -70,7 +80,7 @@ impl Decoder {
             return Err(Error::input("the file is empty"));
         }
         Err(Error::input("the file is no image of a known format")
-            .help("EXR, HDR, PNG, JPEG, BMP and TGA are known"))
+            .help("EXR, HDR, PFM, PNG, JPEG, BMP, TGA and PPM are known"))
     }
 }
 

@@ -1,58 +1,91 @@
-//! What the JPEG decoder does not tell: it fills the rest of a broken picture with grey, and it guesses
-//! at inks. So the file's markers (ITU-T T.81, annex B) are walked first, which finds a file that ends
-//! before its picture does, and a picture of other than one (grey) or three (colour) components.
+//! JPEG, grey or RGB with 8 bits a sample, as libjpeg-turbo decodes it, to the bit: its exact inverse transform, and
+//! its interpolation of chroma (ITU-T T.81 and T.871 leave both to the decoder). The last marker may be
+//! missing; what ends before its last sample is an error, and so is anything else that is damaged.
 
+use libjpeg_turbo_rs::{DecodeLimits, Decoder, JpegError, PixelFormat};
+
+use super::raster::{check_size, codes};
 use crate::error::{Error, Result};
+use crate::image::{Encoding, Image, Limits, Picture};
 
-const START_OF_IMAGE: u8 = 0xd8;
-const END_OF_IMAGE: u8 = 0xd9;
-const START_OF_SCAN: u8 = 0xda;
+/// How many bytes of samples a byte of the file can make: 64 in a bit.
+const MOST_PER_BYTE: u64 = 4096;
+/// More passes over a picture than any encoder makes; each of them takes time.
+const MOST_SCANS: usize = 1000;
 
-/// Refuses truncated files and those of other colours than grey and RGB.
-pub(super) fn check(bytes: &[u8]) -> Result<()> {
-    let mut rest = bytes;
-    while let Some((marker, after)) = next_marker(rest) {
-        rest = after;
-        match marker {
-            START_OF_IMAGE | 0x01 | 0xd0..=0xd7 => continue,
-            END_OF_IMAGE => return Err(Error::input("the file holds no picture")),
-            _ => {}
-        }
-        let Some(segment) = segment(rest) else { break };
-        if marker == START_OF_SCAN {
-            // Coded data holds no marker but restarts, so the picture's end cannot be mistaken.
-            let ends = rest.windows(2).any(|pair| pair == [0xff, END_OF_IMAGE]);
-            return if ends {
-                Ok(())
-            } else {
-                Err(Error::input("the file ends in the middle of the picture"))
-            };
-        }
-        // SOF0..SOF15, without the tables DHT, JPG and DAC that share the range.
-        if (0xc0..=0xcf).contains(&marker) && ![0xc4, 0xc8, 0xcc].contains(&marker) {
-            let components = segment.get(5).copied().unwrap_or(0);
-            if components != 1 && components != 3 {
-                return Err(Error::unsupported(format!(
-                    "a JPEG of {components} components is neither grey nor RGB"
-                ))
-                .help("convert it to RGB"));
-            }
-        }
-        rest = &rest[segment.len() + 2..];
+/// Decodes the bytes of a JPEG file.
+pub(super) fn decode(bytes: &[u8], limits: &Limits) -> Result<Picture> {
+    const END_OF_IMAGE: [u8; 2] = [0xff, 0xd9];
+    match decode_marked(bytes, limits) {
+        // Of several scans the decoder wants to see the end.
+        Err(Refusal::Early) => decode_marked(&[bytes, &END_OF_IMAGE].concat(), limits),
+        result => result,
     }
-    Err(Error::input("the file ends before the picture begins"))
+    .map_err(|refusal| match refusal {
+        Refusal::Early => Error::input("the file ends too early"),
+        Refusal::Other(error) => error,
+    })
 }
 
-/// The next marker's code, and what follows it.
-fn next_marker(bytes: &[u8]) -> Option<(u8, &[u8])> {
-    let at = bytes
-        .windows(2)
-        .position(|pair| pair[0] == 0xff && pair[1] != 0 && pair[1] != 0xff)?;
-    Some((bytes[at + 1], &bytes[at + 2..]))
+/// Why a file is not decoded.
+enum Refusal {
+    /// It ends before its picture does.
+    Early,
+    Other(Error),
 }
 
-/// The content of the segment that begins with its own length.
-fn segment(bytes: &[u8]) -> Option<&[u8]> {
-    let length = usize::from(u16::from_be_bytes([*bytes.first()?, *bytes.get(1)?]));
-    bytes.get(2..length)
+impl From<Error> for Refusal {
+    fn from(error: Error) -> Self {
+        Self::Other(error)
+    }
+}
+
+impl From<JpegError> for Refusal {
+    fn from(error: JpegError) -> Self {
+        Self::Other(match error {
+            JpegError::UnexpectedEof => return Self::Early,
+            JpegError::Unsupported(what) => Error::unsupported(what),
+            other => Error::input(other.to_string()),
+        })
+    }
+}
+
+fn decode_marked(bytes: &[u8], limits: &Limits) -> std::result::Result<Picture, Refusal> {
+    let most = DecodeLimits {
+        max_width: u16::MAX.into(),
+        max_height: u16::MAX.into(),
+        max_pixels: u64::MAX,
+        max_scans: MOST_SCANS,
+        // The samples in all their forms take fewer bytes than the image, which the limits bound.
+        max_memory: None,
+    };
+    let mut decoder = Decoder::new_with_limits(bytes, most)?;
+    let header = decoder.header();
+    let (width, height) = (u32::from(header.width), u32::from(header.height));
+    let (names, pixels): (&[&str], _) = match header.components.len() {
+        1 => (&["Y"], PixelFormat::Grayscale),
+        3 => (&["R", "G", "B"], PixelFormat::Rgb),
+        n => {
+            let error =
+                Error::unsupported(format!("a JPEG of {n} components is neither grey nor RGB"));
+            return Err(error.help("convert it to RGB").into());
+        }
+    };
+    if header.precision != 8 {
+        let bits = header.precision;
+        let error = Error::unsupported(format!("a JPEG of {bits} bits a sample"));
+        return Err(error.help("convert it to 8 bits").into());
+    }
+    check_size([width, height], names.len(), MOST_PER_BYTE, bytes, limits)?;
+    decoder.set_output_format(pixels);
+    // As libjpeg does where a progressive file lacks its last scans.
+    decoder.set_block_smoothing(true);
+    let decoded = decoder.decode_image()?;
+    let names = names.iter().map(ToString::to_string).collect();
+    Ok(Picture {
+        image: Image::from_data(width, height, names, codes(&decoded.data))?,
+        encoding: Encoding::Srgb,
+        metadata: Vec::new(),
+        warnings: Vec::new(),
+    })
 }

@@ -1,6 +1,7 @@
 //! Images: a strided buffer of named f32 channels with views, and files in and out. Reading takes EXR,
-//! HDR, PNG, JPEG, BMP and TGA and gives values as the file holds them; writing takes linear values as
-//! EXR or HDR and ready codes as PNG. Which curve lies between the two is the display layer's business.
+//! HDR, PFM, PNG, JPEG, BMP, TGA and PPM and gives values as the file holds them, but for colours that a file says
+//! to be of other primaries, which become those of BT.709; writing takes linear values as EXR or HDR and ready codes
+//! as PNG. Which curve lies between the two is the display layer's business.
 
 mod buffer;
 mod codes;
@@ -8,6 +9,7 @@ mod format;
 mod jpeg;
 mod metadata;
 mod openexr;
+mod pfm;
 mod radiance;
 mod raster;
 mod view;
@@ -22,16 +24,16 @@ pub use format::Format;
 pub use metadata::{MetaValue, Metadata, Window};
 pub use view::View;
 
-use crate::error::{Error, Location, Result};
+use crate::error::{Error, Location, Problem, Result};
 use crate::file;
 use format::Decoder;
 
 /// What the values of a picture mean.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Encoding {
-    /// Linear values (EXR, HDR).
+    /// Linear values (EXR, HDR, PFM).
     Linear,
-    /// Code values in [0, 1], still encoded by the sRGB curve (PNG, JPEG, BMP, TGA); opacity is linear.
+    /// Code values in [0, 1], still encoded by the sRGB curve (PNG, JPEG, BMP, TGA, PPM); opacity is linear.
     Srgb,
 }
 
@@ -44,6 +46,8 @@ pub struct Picture {
     pub encoding: Encoding,
     /// The file's own remarks (EXR attributes) as text, by name.
     pub metadata: Vec<(String, String)>,
+    /// What of the file was left out.
+    pub warnings: Vec<Problem>,
 }
 
 /// How much memory reading a file may take.
@@ -92,7 +96,12 @@ pub fn read(path: &Path, limits: &Limits) -> Result<Picture> {
         .at(&Location::of_file(path)));
     }
     let bytes = fs::read(path).map_err(refused)?;
-    decode(path, &bytes, limits).map_err(|e| e.at(&Location::of_file(path)))
+    let place = Location::of_file(path);
+    let mut picture = decode(path, &bytes, limits).map_err(|e| e.at(&place))?;
+    for warning in &mut picture.warnings {
+        warning.location.get_or_insert_with(|| place.clone());
+    }
+    Ok(picture)
 }
 
 /// Decodes the bytes of an image file; `path` only tells TGA from what is no image.
@@ -101,11 +110,18 @@ fn decode(path: &Path, bytes: &[u8], limits: &Limits) -> Result<Picture> {
     // The checks before it should leave a decoder nothing to panic about. It is other people's code
     // on a stranger's file, though, so a panic that slips through is one more kind of damaged file.
     // Nothing that it could leave half-changed survives it.
-    catch_unwind(AssertUnwindSafe(|| match decoder {
+    catch_unwind(AssertUnwindSafe(|| decode_by(decoder, bytes, limits)))
+        .unwrap_or_else(|_| Err(Error::input("the file is damaged")))
+}
+
+fn decode_by(decoder: Decoder, bytes: &[u8], limits: &Limits) -> Result<Picture> {
+    match decoder {
         Decoder::Exr => openexr::decode(bytes, limits),
+        Decoder::Hdr => radiance::decode(bytes, limits),
+        Decoder::Jpeg => jpeg::decode(bytes, limits),
+        Decoder::Pfm => pfm::decode(bytes, limits),
         Decoder::Raster(format) => raster::decode(bytes, format, limits),
-    }))
-    .unwrap_or_else(|_| Err(Error::input("the file is damaged")))
+    }
 }
 
 /// Writes linear values as EXR (all channels, metadata) or HDR (main colour), by the extension. The file

@@ -64,19 +64,13 @@ impl<C: ColorModel> Envmap<C> {
         let scale = properties.float("scale")?;
         let to_world = rotation(properties)?;
         let picture = Picture::read(&path, false).map_err(|e| e.at(properties.location()))?;
-        let [width, height] = picture.size();
-        if width < 2 || height < 3 {
-            let message =
-                format!("an envmap needs 2 × 3 texels at least, and has {width} × {height}");
-            return Err(properties.error("filename", message));
-        }
+        let [width, height] = size(&picture);
         let color = &context.palettes.colors.color;
         let weights = weights(&picture);
         Ok(Self {
             width,
             height,
-            texels: picture
-                .texels()
+            texels: texels(&picture)
                 .map(|rgb| color.texel(rgb, Role::Emission))
                 .collect(),
             scale: scale as f32,
@@ -121,11 +115,22 @@ impl<C: ColorModel> Envmap<C> {
     }
 }
 
+/// Columns and rows: one at each pole and one between them at the least.
+fn size(picture: &Picture) -> [usize; 2] {
+    let [width, height] = picture.size();
+    [width, height.max(3)]
+}
+
+/// The texels of all rows; those that the image lacks are its last one, as in Mitsuba.
+fn texels(picture: &Picture) -> impl Iterator<Item = [f32; 3]> {
+    let last = picture.size()[1] - 1;
+    (0..size(picture)[1]).flat_map(move |y| picture.row(y.min(last)))
+}
+
 /// What each cell may emit, row by row.
 fn weights(picture: &Picture) -> Vec<f64> {
-    let [width, height] = picture.size();
-    let bright: Vec<f32> = picture
-        .texels()
+    let [width, height] = size(picture);
+    let bright: Vec<f32> = texels(picture)
         .map(|rgb| luminance(rgb.map(f32::abs)))
         .collect();
     let cosine = |row: usize| (std::f64::consts::PI * row as f64 / (height - 1) as f64).cos();

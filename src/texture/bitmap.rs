@@ -110,7 +110,15 @@ impl<C: ColorModel> Bitmap<C> {
             Some(texels) => texels,
             None => {
                 let loaded = load(&key.0, palette, raw).map_err(|e| e.at(properties.location()))?;
-                lock().entry(key).or_insert(Arc::new(loaded)).clone()
+                let Loaded { texels, clamped } = loaded;
+                if clamped > 0 {
+                    let all = texels.texels.len();
+                    let message = format!(
+                        "{clamped} of {all} texels reflect less than 0 or more than 1, and are clamped"
+                    );
+                    palette.warn(properties.error("filename", message));
+                }
+                lock().entry(key).or_insert(Arc::new(texels)).clone()
             }
         };
         Ok(Self {
@@ -148,11 +156,17 @@ impl<C: ColorModel> Bitmap<C> {
     }
 }
 
+struct Loaded<C: ColorModel> {
+    texels: Texels<C>,
+    /// How many texels are no reflectances.
+    clamped: usize,
+}
+
 fn load<C: ColorModel>(
     path: &std::path::Path,
     palette: &Palette<C>,
     raw: bool,
-) -> Result<Texels<C>> {
+) -> Result<Loaded<C>> {
     let picture = Picture::read(path, raw)?;
     let [width, height] = picture.size();
     let role = if raw && palette.role == Role::Reflectance {
@@ -160,14 +174,20 @@ fn load<C: ColorModel>(
     } else {
         palette.role
     };
-    let texels = picture
-        .texels()
-        .map(|rgb| palette.color.texel(rgb, role))
-        .collect();
-    Ok(Texels {
-        width,
-        height,
-        texels,
+    let mut clamped = 0;
+    let texel = |rgb: [f32; 3]| {
+        let fits = role != Role::Reflectance || rgb.iter().all(|v| (0.0..=1.0).contains(v));
+        clamped += usize::from(!fits);
+        palette.color.texel(rgb, role)
+    };
+    let texels = picture.texels().map(texel).collect();
+    Ok(Loaded {
+        texels: Texels {
+            width,
+            height,
+            texels,
+        },
+        clamped,
     })
 }
 

@@ -23,12 +23,13 @@ impl Picture {
     /// Where the file cannot be read or holds no colours.
     pub fn read(path: &Path, raw: bool) -> Result<Self> {
         let picture = image::read(path, &Limits::default())?;
-        let Some(rgb) = picture.image.rgb() else {
-            let message = format!("no colour channels among {:?}", picture.image.channels());
+        let image = picture.image.into_rgb();
+        let Some(rgb) = image.rgb() else {
+            let message = format!("no colour channels among {:?}", image.channels());
             return Err(Error::input(message).at(&Location::of_file(path)));
         };
         Ok(Self {
-            image: picture.image,
+            image,
             rgb,
             encoded: picture.encoding != Encoding::Linear && !raw,
         })
@@ -41,9 +42,19 @@ impl Picture {
 
     /// All texels, row by row from the top.
     pub fn texels(&self) -> impl Iterator<Item = [f32; 3]> {
-        let (width, height) = (self.image.width(), self.image.height());
-        let texel = |x, y| self.rgb.map(|c| self.decode(self.image.get(x, y, c)));
-        (0..height).flat_map(move |y| (0..width).map(move |x| texel(x, y)))
+        (0..self.size()[1]).flat_map(|y| self.row(y))
+    }
+
+    /// The texels of a row, the top one being 0.
+    ///
+    /// # Panics
+    /// Below the image, as soon as a texel is taken.
+    pub fn row(&self, y: usize) -> impl Iterator<Item = [f32; 3]> {
+        let texel = move |x| {
+            let pixel = self.image.pixel(x, y as u32);
+            self.rgb.map(|c| self.decode(pixel[c]))
+        };
+        (0..self.image.width()).map(texel)
     }
 
     fn decode(&self, value: f32) -> f32 {

@@ -276,3 +276,38 @@ fn every_texture_is_made_in_every_colour_model() {
     assert_eq!(every_texture(&bands).len(), Texture::<Rgb>::NAMES.len());
     assert_eq!(every_texture(&Mono).len(), Texture::<Rgb>::NAMES.len());
 }
+
+#[test]
+fn a_bitmap_that_reflects_more_than_all_is_clamped_with_a_warning() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("two.exr");
+    let names = ["R", "G", "B"].map(String::from).to_vec();
+    let data = vec![2.0, 0.5, 0.25, 0.1, 0.2, 0.3, 0.1, -0.5, 0.3];
+    let image = crate::image::Image::from_data(3, 1, names, data).unwrap();
+    crate::image::write(&path, &image, &Default::default()).unwrap();
+    let bitmap = |raw: bool| {
+        format!(
+            "<texture type='bitmap'><string name='filename' value='{}'/>
+             <boolean name='raw' value='{raw}'/></texture>",
+            path.display()
+        )
+    };
+    for (raw, role, expected) in [
+        (false, Role::Reflectance, Some("2 of 3 texels")),
+        (true, Role::Reflectance, None),
+        (false, Role::Emission, None),
+    ] {
+        let palette = Palette::new(Rgb);
+        let texture = built(&bitmap(raw), &palette, role).unwrap();
+        let first = texture
+            .eval(&Interaction::at_uv(Vec2::new(1.0 / 6.0, 0.5)), &())
+            .0;
+        let red = if expected.is_some() { 1.0 } else { 2.0 };
+        assert_close(first, [red, 0.5, 0.25], "the first texel");
+        let warnings = palette.warnings.lock().unwrap().clone();
+        assert_eq!(warnings.len(), usize::from(expected.is_some()));
+        if let Some(expected) = expected {
+            assert!(warnings[0].message.contains(expected), "{warnings:?}");
+        }
+    }
+}

@@ -2,8 +2,10 @@
 //! (openexr.com, "OpenEXR File Layout"). The crate `exr` codes the blocks of pixels; which blocks, where
 //! they go and how much memory they may take is decided here.
 
+mod colors;
 mod dwa;
 mod read;
+mod sampling;
 mod write;
 
 pub(super) use read::{MAGIC, decode};

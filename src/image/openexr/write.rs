@@ -8,6 +8,7 @@ use std::io::Cursor;
 use ::exr::block::writer::ChunksWriter;
 use ::exr::block::{self, BlockIndex, UncompressedBlock};
 use ::exr::meta::BlockDescription;
+use ::exr::meta::attribute::Chromaticities;
 use ::exr::meta::header::{Header, LayerAttributes, standard_names};
 use ::exr::prelude::{
     AttributeValue, ChannelDescription, Compression, IntegerBounds, LineOrder, SampleType,
@@ -17,6 +18,7 @@ use glam::Mat4;
 use rayon::prelude::*;
 
 use super::{WORLD_TO_CAMERA, WORLD_TO_NDC, batch_length};
+use crate::color::Primaries;
 use crate::error::{Error, Result};
 use crate::image::{Image, MetaValue, Metadata, Window};
 
@@ -111,14 +113,32 @@ fn header(image: &Image, window: &Window, order: &[usize], metadata: &Metadata) 
     let full = Vec2(window.full_width as usize, window.full_height as usize);
     let mut attributes = attributes(metadata)?;
     attributes.layer_position = Vec2(window.x as i32, window.y as i32);
-    Ok(Header::new(Text::default(), size, channels)
+    let mut header = Header::new(Text::default(), size, channels)
         .with_encoding(
             Compression::ZIP16,
             BlockDescription::ScanLines,
             LineOrder::Increasing,
         )
         .with_display_window(IntegerBounds::new((0, 0), full))
-        .with_attributes(attributes))
+        .with_attributes(attributes);
+    header.shared_attributes.chromaticities = chromaticities(image);
+    Ok(header)
+}
+
+/// What the image's colours are, if it has any.
+fn chromaticities(image: &Image) -> Option<Chromaticities> {
+    let primaries = match (image.xyz(), image.rgb()) {
+        (Some(_), _) => Primaries::XYZ,
+        (None, Some(_)) => Primaries::BT709,
+        (None, None) => return None,
+    };
+    let point = |[x, y]: [f64; 2]| Vec2(x as f32, y as f32);
+    Some(Chromaticities {
+        red: point(primaries.red),
+        green: point(primaries.green),
+        blue: point(primaries.blue),
+        white: point(primaries.white),
+    })
 }
 
 fn attributes(metadata: &Metadata) -> Result<LayerAttributes> {

@@ -2,7 +2,9 @@
 
 use super::*;
 
+mod colors;
 mod damaged;
+mod jpegs;
 mod round_trip;
 
 /// An image whose samples all differ, brighter than a display too.
@@ -94,4 +96,23 @@ fn raster_bytes(
     let mut file = std::io::Cursor::new(Vec::new());
     ::image::write_buffer_with_format(&mut file, &codes, width, height, color, format).unwrap();
     file.into_inner()
+}
+
+/// The bytes of a JPEG file of 16 × 6 pixels, whose chroma has half the resolution.
+fn jpeg_bytes(progressive: bool) -> Vec<u8> {
+    use libjpeg_turbo_rs::{Encoder, PixelFormat, Subsampling};
+    let codes: Vec<u8> = (0..16 * 6 * 3).map(|i| (i * 37 % 251) as u8).collect();
+    Encoder::new(&codes, 16, 6, PixelFormat::Rgb)
+        .quality(80)
+        .subsampling(Subsampling::S420)
+        .progressive(progressive)
+        .encode()
+        .unwrap()
+}
+
+/// The bytes of a PFM file.
+fn pfm_bytes(image: &Image) -> Vec<u8> {
+    let mut bytes = format!("PF {} {} -1\n", image.width(), image.height()).into_bytes();
+    bytes.extend(image.data().iter().flat_map(|v| v.to_le_bytes()));
+    bytes
 }
