@@ -6,6 +6,9 @@ use std::fmt;
 use std::path::Path;
 use std::sync::Arc;
 
+/// In place of a file's name.
+const COMMAND_LINE: &str = "command line";
+
 /// A place in a file that the user wrote.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Location {
@@ -25,6 +28,16 @@ impl Location {
             line: 0,
             column: 0,
         }
+    }
+
+    /// What stands in for a file where a value comes from the command line.
+    pub fn command_line() -> Self {
+        Self::of_file(Path::new(COMMAND_LINE))
+    }
+
+    /// Whether a value comes from the command line.
+    pub fn is_command_line(&self) -> bool {
+        *self.file == *Path::new(COMMAND_LINE)
     }
 
     /// Line `line` (from 1) of `file`.

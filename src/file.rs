@@ -26,6 +26,7 @@ pub(crate) fn stream_atomically(
     const BUFFER: usize = 1 << 18;
     let target = resolve(path)?;
     let refused = |cause: &std::io::Error| Error::system("write", path, cause);
+    fs::create_dir_all(folder_of(&target)).map_err(|e| refused(&e))?;
     let mut file = temporary_beside(&target).map_err(|e| refused(&e))?;
     let mut buffer = BufWriter::with_capacity(BUFFER, file.as_file_mut());
     write(&mut buffer)
@@ -68,20 +69,43 @@ pub(crate) fn seal(key: &blake3::Hash, sums: &[u32]) -> blake3::Hash {
 /// Finds out, without leaving anything behind, whether `path` could be written.
 pub(crate) fn check_writable(path: &Path) -> Result<()> {
     let target = resolve(path)?;
-    temporary_beside(&target)
+    // Of folders that would be made, the one that they would be made in is tried.
+    let folder = existing(folder_of(&target));
+    temporary_beside(&folder.join("file"))
         .map(drop)
         .map_err(|e| Error::system("write", path, &e))
 }
 
+/// The folder, or the nearest above it that is there.
+fn existing(folder: &Path) -> &Path {
+    match folder.parent() {
+        Some(above) if !folder.exists() && above.as_os_str().is_empty() => Path::new("."),
+        Some(above) if !folder.exists() => existing(above),
+        _ => folder,
+    }
+}
+
+/// Opens a regular file. Others are refused before they are opened: opening a pipe may wait for ever.
+pub(crate) fn open(path: &Path) -> std::io::Result<File> {
+    let about = fs::metadata(path)?;
+    if about.is_file() {
+        return File::open(path);
+    }
+    Err(std::io::Error::other(match about.is_dir() {
+        true => "it is a folder",
+        false => "it is no regular file",
+    }))
+}
+
 /// The file that `path` names, links followed, after checking that it can be replaced.
 fn resolve(path: &Path) -> Result<PathBuf> {
-    let folder = folder_of(path);
+    let folder = existing(folder_of(path));
     if !folder.is_dir() {
-        let folder = folder.display();
-        return Err(Error::input(format!("folder {folder} does not exist")).help("create it"));
+        let message = format!("{} is not a folder", folder.display());
+        return Err(Error::input(message).help("choose another place"));
     }
     let Ok(there) = fs::metadata(path) else {
-        return Ok(path.to_path_buf());
+        return follow(path);
     };
     let name = path.display();
     if there.is_dir() {
@@ -120,6 +144,19 @@ pub(crate) fn read_at(file: &File, mut at: u64, mut bytes: &mut [u8]) -> std::io
     Ok(())
 }
 
+/// Where a link leads whose file is not there yet; the path itself where it is none.
+fn follow(path: &Path) -> Result<PathBuf> {
+    match fs::read_link(path) {
+        Ok(target) if folder_of(path).join(&target).exists() => Ok(folder_of(path).join(target)),
+        Ok(target) => {
+            let (name, target) = (path.display(), target.display());
+            let message = format!("{name} is a link to {target}, which is not there");
+            Err(Error::input(message).help("remove the link or make what it leads to"))
+        }
+        Err(_) => Ok(path.to_path_buf()),
+    }
+}
+
 fn folder_of(path: &Path) -> &Path {
     match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
@@ -127,16 +164,42 @@ fn folder_of(path: &Path) -> &Path {
     }
 }
 
+/// What the names of this process's temporary files begin with.
+fn temporary_prefix() -> String {
+    format!(".etendue-{}-", std::process::id())
+}
+
+/// Removes what this process has begun to write as `path` or beside it, for who is about to end the process.
+pub fn remove_unfinished(path: &Path) {
+    let prefix = temporary_prefix();
+    let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    for entry in fs::read_dir(folder_of(&target))
+        .into_iter()
+        .flatten()
+        .flatten()
+    {
+        if entry.file_name().to_string_lossy().starts_with(&prefix) {
+            let _ = fs::remove_file(entry.path());
+        }
+    }
+}
+
 fn temporary_beside(target: &Path) -> std::io::Result<NamedTempFile> {
     let mut builder = tempfile::Builder::new();
-    builder.prefix(".etendue-");
+    let prefix = temporary_prefix();
+    builder.prefix(&prefix);
     #[cfg(unix)]
     {
         // What any program asks for a new file; the user's umask takes its share.
         use std::os::unix::fs::PermissionsExt;
         builder.permissions(fs::Permissions::from_mode(0o666));
     }
-    builder.tempfile_in(folder_of(target))
+    let file = builder.tempfile_in(folder_of(target))?;
+    if let Ok(there) = fs::metadata(target) {
+        // What takes a file's place is for the same people to read.
+        file.as_file().set_permissions(there.permissions())?;
+    }
+    Ok(file)
 }
 
 #[cfg(test)]
@@ -176,11 +239,11 @@ mod tests {
         fs::set_permissions(&read_only, permissions).unwrap();
         let subfolder = folder.path().join("sub.exr");
         fs::create_dir(&subfolder).unwrap();
-        let missing = folder.path().join("none/a.exr");
+        let below = read_only.join("none/a.exr");
         for (path, message) in [
             (&read_only, "is read-only"),
             (&subfolder, "is a folder"),
-            (&missing, "does not exist; create it"),
+            (&below, "is not a folder"),
         ] {
             for error in [
                 check_writable(path).unwrap_err(),
@@ -205,6 +268,37 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         check_writable(&folder.path().join("a.exr")).unwrap();
         assert!(entries(folder.path()).is_empty());
+    }
+
+    #[test]
+    fn folders_are_made_when_something_is_written_to_them_and_no_sooner() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a/b/c.exr");
+        check_writable(&path).unwrap();
+        assert!(entries(folder.path()).is_empty());
+        write_atomically(&path, b"new").unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"new");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_file_that_is_replaced_keeps_its_mode_and_a_broken_link_is_refused() {
+        use std::os::unix::fs::{PermissionsExt, symlink};
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.exr");
+        fs::write(&path, b"old").unwrap();
+        for mode in [0o600, 0o640, 0o664] {
+            fs::set_permissions(&path, fs::Permissions::from_mode(mode)).unwrap();
+            write_atomically(&path, b"new").unwrap();
+            assert_eq!(
+                fs::metadata(&path).unwrap().permissions().mode() & 0o777,
+                mode
+            );
+        }
+        let link = folder.path().join("link.exr");
+        symlink("nowhere.exr", &link).unwrap();
+        let error = check_writable(&link).unwrap_err().to_string();
+        assert!(error.contains("a link to nowhere.exr"), "{error}");
     }
 
     #[cfg(unix)]

@@ -4,7 +4,7 @@
 
 pub mod error;
 
-pub(crate) mod file;
+pub mod file;
 pub mod math;
 
 pub mod color;

@@ -3,30 +3,13 @@
 
 use std::path::{Path, PathBuf};
 
-use etendue::description::{Description, NodeId};
 use etendue::error::{Error, Result};
 use etendue::render::Session;
 
 use super::output::Names;
+use super::overrides::{self, Chosen, Sensors};
 use super::parse::Frames;
-use super::scene::{SceneArguments, sensors};
-
-/// Which sensors of each scene.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum Sensors {
-    All,
-    /// A number from 0, or an id.
-    One(String),
-}
-
-impl From<&str> for Sensors {
-    fn from(text: &str) -> Self {
-        match text {
-            "all" => Self::All,
-            one => Self::One(one.to_owned()),
-        }
-    }
-}
+use super::scene::SceneArguments;
 
 /// One image.
 #[derive(Clone, Debug)]
@@ -87,6 +70,7 @@ pub(super) struct Request<'a> {
     pub(super) output: &'a str,
     pub(super) heatmap: Option<&'a str>,
     pub(super) scene: &'a SceneArguments,
+    pub(super) memory_limit: Option<u64>,
 }
 
 impl Request<'_> {
@@ -102,16 +86,16 @@ impl Request<'_> {
                 }
             };
             for frame in self.numbers() {
-                for (sensor, label) in &chosen {
+                for sensor in &chosen {
                     let names = Names {
                         input,
                         frame: frame.unwrap_or(0),
-                        sensor: label,
+                        sensor: &sensor.name,
                     };
                     batch.items.push(Item {
                         input: input.clone(),
                         frame,
-                        sensor: *sensor,
+                        sensor: sensor.number,
                         output: names.expand(self.output)?,
                         heatmap: self.heatmap.map(|path| names.expand(path)).transpose()?,
                     });
@@ -129,48 +113,19 @@ impl Request<'_> {
     }
 
     /// Numbers and names of the sensors that are meant. The scene is read only where they depend on it.
-    fn chosen(&self, input: &Path) -> Result<Vec<(usize, String)>> {
+    fn chosen(&self, input: &Path) -> Result<Vec<Chosen>> {
         let mut patterns = [Some(self.output), self.heatmap].into_iter().flatten();
         if self.sensors.is_none() && !patterns.any(|pattern| pattern.contains("{sensor}")) {
-            return Ok(vec![(0, String::new())]);
+            return Ok(vec![Chosen::default()]);
         }
         let frame = self.numbers()[0];
-        let description =
-            self.scene
-                .describe(input, &self.scene.options(frame), &mut Session::default())?;
-        let names = names(&description);
-        let all = names.iter().cloned().enumerate();
-        Ok(match self.sensors {
-            None => all.take(1).collect(),
-            Some(Sensors::All) => all.collect(),
-            Some(Sensors::One(one)) => {
-                let by_id = names.iter().position(|name| name == one);
-                let by_number = || one.parse().ok().filter(|n| *n < names.len());
-                let Some(found) = by_id.or_else(by_number) else {
-                    let error = Error::input(format!(
-                        "{} has no sensor {one:?}; there are {}",
-                        input.display(),
-                        names.join(", ")
-                    ));
-                    return Err(error.suggest(one, names.iter().map(String::as_str)));
-                };
-                vec![(found, names[found].clone())]
-            }
-        })
+        let mut session = Session::default();
+        let description = self.scene.describe(
+            input,
+            &self.scene.options(frame),
+            self.memory_limit,
+            &mut session,
+        )?;
+        overrides::chosen(&description, self.sensors)
     }
-}
-
-/// The sensors' ids, or their numbers where they have none.
-fn names(description: &Description) -> Vec<String> {
-    let name = |(number, id): (usize, NodeId)| {
-        let sensor = description.node(id);
-        sensor
-            .id()
-            .map_or_else(|| number.to_string(), str::to_owned)
-    };
-    sensors(description)
-        .into_iter()
-        .enumerate()
-        .map(name)
-        .collect()
 }

@@ -3,17 +3,19 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use etendue::error::{Problem, Result};
-use etendue::render::{self, Options, Session, Silent};
+use etendue::error::{Problem, Problems, Result};
+use etendue::render::{Options, Session, Silent};
 use serde_json::json;
 
+use super::memory::RunArguments;
+use super::overrides::{self, ImageArguments};
 use super::scene::SceneArguments;
 use super::{output, report, status};
 
 /// Find everything that is wrong with scenes, without rendering
 ///
-/// Meshes and images are loaded, and all sensors, materials and lights are built. What is wrong goes to
-/// standard error, with the line that says it.
+/// Says what `etendue render` with the same options would say: meshes and images are loaded, and sensors,
+/// materials and lights are built. What is wrong goes to standard error, with the line that says it.
 #[derive(Args, Debug)]
 #[command(after_help = status::HELP)]
 pub(super) struct Arguments {
@@ -22,6 +24,10 @@ pub(super) struct Arguments {
     inputs: Vec<PathBuf>,
     #[command(flatten)]
     scene: SceneArguments,
+    #[command(flatten)]
+    image: ImageArguments,
+    #[command(flatten)]
+    run: RunArguments,
     /// Print a JSON object for each scene: ok, problems, warnings
     #[arg(long)]
     json: bool,
@@ -67,9 +73,31 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     Ok(worst)
 }
 
-/// The warnings.
+/// The warnings, through all sensors that are meant.
 fn check(arguments: &Arguments, input: &Path) -> Result<Vec<Problem>> {
-    let scene = &arguments.scene;
-    let description = scene.describe(input, &scene.options(None), &mut Session::default())?;
-    render::check(&description, &Options::default(), &Silent)
+    let (scene, image, mut session) = (&arguments.scene, &arguments.image, Session::default());
+    let memory_limit = arguments.run.memory.limit();
+    let read = scene.options(None);
+    let mut description = scene.describe(input, &read, memory_limit, &mut session)?;
+    let chosen = overrides::chosen(&description, image.sensors())?;
+    image.overrides().apply(&mut description);
+    let mut problems = Problems::default();
+    let mut warnings: Vec<Problem> = Vec::new();
+    for sensor in chosen {
+        let options = Options {
+            sensor: sensor.number,
+            colors: image.colors(),
+            threads: arguments.run.threads,
+            memory_limit,
+            ..Options::default()
+        };
+        let found = session.check(&description, &options, &Silent);
+        for warning in problems.take(found).into_iter().flatten() {
+            if !warnings.contains(&warning) {
+                warnings.push(warning);
+            }
+        }
+    }
+    problems.finish()?;
+    Ok(warnings)
 }

@@ -1,16 +1,19 @@
 //! `etendue crosscheck`: scenes on both sides, here and in Mitsuba, and whether the images agree.
 
-use std::path::{Component, Path, PathBuf};
+use std::num::NonZeroUsize;
+use std::path::{Component, PathBuf};
 use std::time::Duration;
 
 use clap::Args;
-use etendue::crosscheck::{self, Settings, Side, Watch};
+use etendue::crosscheck::{self, Python, Settings, Side, Watch};
 use etendue::error::{Error, Result};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
+use super::overrides::ImageArguments;
+use super::scene::ReadArguments;
 use super::stop::Stop;
 use super::verdicts::{self, Ending, Style};
-use super::{parse, report, status};
+use super::{output, parse, report, status};
 
 /// Render scenes here and in Mitsuba, and say whether the images agree
 ///
@@ -23,16 +26,17 @@ use super::{parse, report, status};
 /// are the median of a seed's, without starting and loading; ratios are medians over pairs of seeds.
 ///
 /// Mitsuba is driven through Python: that of --python, else of $ETENDUE_PYTHON, else of the environment that
-/// `tools/venv` makes, else python3. A scene that asks for what one side lacks is told as not comparable.
+/// --install makes. A scene that asks for what one side lacks is told as not comparable.
 #[derive(Args, Debug)]
 #[command(after_help = HELP)]
 pub(super) struct Arguments {
     /// Scene files (.xml)
-    #[arg(required = true, value_name = "SCENE")]
+    #[arg(required_unless_present = "install", value_name = "SCENE")]
     scenes: Vec<PathBuf>,
-    /// Value of a $name parameter of the scenes
-    #[arg(short = 'D', value_name = "NAME=VALUE", value_parser = parse::define)]
-    define: Vec<(String, String)>,
+    #[command(flatten)]
+    read: ReadArguments,
+    #[command(flatten)]
+    image: ImageArguments,
     /// Let Mitsuba render this scene instead: the same in words that Mitsuba knows
     #[arg(long, value_name = "SCENE")]
     reference: Option<PathBuf>,
@@ -43,31 +47,25 @@ pub(super) struct Arguments {
     /// The first seed; the others follow it
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(..1 << 31))]
     seed: u64,
-    /// Samples a pixel and seed, in place of the scene's sample_count
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
-    spp: Option<u32>,
-    /// Size of the film in pixels
-    #[arg(long, value_name = "WxH", value_parser = parse::size)]
-    size: Option<(u32, u32)>,
-    /// The integrator's max_depth
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
-    max_depth: Option<i64>,
-    /// Render N spectral bands here; Mitsuba's variant is scalar_spectral then
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=32))]
-    bands: Option<u8>,
 
-    /// Mitsuba's variant; with a spectral one, 8 bands are rendered here [default: scalar_rgb]
+    /// Mitsuba's variant; with a spectral one, 8 bands are rendered here [default: scalar_rgb, and with --bands
+    /// scalar_spectral]
     #[arg(long, value_name = "NAME")]
     variant: Option<String>,
     /// The Python that has Mitsuba
     #[arg(long, value_name = "PATH")]
     python: Option<PathBuf>,
-    /// A folder of Python files that register plugins with Mitsuba; by default tools/mitsuba where it is there
+    /// First make an environment with Mitsuba in Étendue's folder for caches, by --python or python3, which takes it
+    /// from the Python package index
+    #[arg(long)]
+    install: bool,
+    /// A folder of Python files that register plugins with Mitsuba, in place of Étendue's own phong, ambient, plane and
+    /// cone
     #[arg(long, value_name = "DIR")]
     plugins: Option<PathBuf>,
     /// Threads of each side; one a processor by default
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
-    threads: Option<u32>,
+    #[arg(long, value_name = "N", value_parser = parse::threads)]
+    threads: Option<NonZeroUsize>,
     /// The longest that a side may take to load a scene, and to render a seed
     #[arg(long, value_name = "SECONDS", default_value = "300", value_parser = parse::seconds)]
     timeout: Duration,
@@ -92,6 +90,7 @@ pub(super) struct Arguments {
 
 const HELP: &str = "\
 Examples:
+  etendue crosscheck --install
   etendue crosscheck scenes/*.xml --size 96x96 --spp 64
   etendue crosscheck scene.xml --seeds 16 --precision 0.002 --keep out
   etendue crosscheck scene.xml --variant llvm_ad_rgb --timing-only --json
@@ -100,15 +99,23 @@ Exit status: 0 done; all scenes agree; 1 one differs; 2 none differs and one cou
 too noisy to say, Mitsuba is not there, or the command line is wrong; 3 the system refused; 130 stopped by \
 Ctrl-C, SIGTERM or SIGHUP.";
 
-/// Where Mitsuba's plugins for what it lacks are kept in a checkout.
-const PLUGINS: &str = "tools/mitsuba";
-
 impl Arguments {
+    /// The Python to use, installed where that is asked for.
+    fn python(&self) -> Result<Python> {
+        if !self.install {
+            return crosscheck::find_python(self.python.as_deref());
+        }
+        let path = crosscheck::install(self.python.as_deref())?;
+        let from = "just installed";
+        Ok(Python { path, from })
+    }
+
     fn settings(&self) -> Result<Settings> {
         let executable = std::env::current_exe()
             .map_err(|e| Error::input(format!("cannot find this program's own file: {e}")))?;
         let spectral = |variant: &String| variant.contains("spectral");
         let bands = self
+            .image
             .bands
             .or_else(|| self.variant.as_ref().filter(|v| spectral(v)).map(|_| 8));
         let variant = match (&self.variant, bands) {
@@ -128,21 +135,21 @@ impl Arguments {
         if let Some(folder) = plugins.as_ref().filter(|folder| !folder.is_dir()) {
             return Err(Error::input(format!("{} is no folder", folder.display())));
         }
-        let usual = Path::new(PLUGINS);
+        let read = self.read.options(None);
         Ok(Settings {
-            python: crosscheck::find_python(self.python.as_deref(), &executable)?,
+            python: self.python()?,
             etendue: (executable, vec![super::CROSSCHECK_WORKER.to_owned()]),
-            plugins: plugins.or_else(|| usual.is_dir().then(|| usual.to_owned())),
+            plugins,
             variant,
             bands,
             reference: self.reference.clone(),
-            defines: self.define.clone(),
-            size: self.size,
-            spp: self.spp,
-            max_depth: self.max_depth,
+            defines: read.defines,
+            strict: read.strict,
+            overrides: self.image.overrides(),
+            sensor: self.image.sensor()?,
             seeds: self.seeds,
             first_seed: self.seed,
-            threads: self.threads,
+            threads: self.threads.map(|n| n.get() as u32),
             timeout: self.timeout,
             keep: None,
             timing_only: self.timing_only,
@@ -160,6 +167,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
             return Ok(status::CANNOT_COMPARE);
         }
     };
+    if arguments.scenes.is_empty() {
+        output::line(&format!("Mitsuba is there: {}", settings.python));
+    }
     let style = Style {
         quiet: arguments.quiet,
         json: arguments.json,

@@ -9,6 +9,8 @@ use etendue::mesh::{self, Per, ReadOptions};
 use etendue::render::{Options, SceneInfo, Session, Silent, human_bytes};
 use serde_json::{Value, json};
 
+use super::memory::RunArguments;
+use super::overrides::{self, ImageArguments};
 use super::scene::{SceneArguments, is_scene};
 use super::{output, report, status};
 
@@ -23,6 +25,10 @@ pub(super) struct Arguments {
     inputs: Vec<PathBuf>,
     #[command(flatten)]
     scene: SceneArguments,
+    #[command(flatten)]
+    image: ImageArguments,
+    #[command(flatten)]
+    run: RunArguments,
     /// Print a JSON object for each file
     #[arg(long)]
     json: bool,
@@ -74,9 +80,20 @@ fn info(arguments: &Arguments, input: &Path) -> Result<Value> {
 
 fn scene(arguments: &Arguments, input: &Path) -> Result<Value> {
     let scene = &arguments.scene;
-    let mut session = Session::default();
-    let description = scene.describe(input, &scene.options(None), &mut session)?;
-    let info = session.info(&description, &Options::default(), &Silent)?;
+    let (image, mut session) = (&arguments.image, Session::default());
+    let memory_limit = arguments.run.memory.limit();
+    let read = scene.options(None);
+    let mut description = scene.describe(input, &read, memory_limit, &mut session)?;
+    let chosen = overrides::chosen(&description, image.sensors())?;
+    image.overrides().apply(&mut description);
+    let options = Options {
+        sensor: chosen.first().map_or(0, |sensor| sensor.number),
+        colors: image.colors(),
+        threads: arguments.run.threads,
+        memory_limit,
+        ..Options::default()
+    };
+    let info = session.info(&description, &options, &Silent)?;
     if !arguments.quiet {
         report::warnings(&info.warnings);
     }

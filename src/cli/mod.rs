@@ -19,6 +19,7 @@ mod batch;
 mod growth;
 mod memory;
 mod output;
+mod overrides;
 mod parse;
 mod progress;
 mod report;
@@ -75,11 +76,15 @@ pub(crate) fn run() -> ExitCode {
         Command::Relight(arguments) => relight::run(&arguments),
         Command::CrosscheckWorker => crosscheck::serve(),
     };
-    match result {
-        Ok(status) => ExitCode::from(status),
-        Err(error) => {
+    let status = result.unwrap_or_else(|error| {
+        report::error(&error);
+        status::of(&error)
+    });
+    ExitCode::from(match output::failure() {
+        Some(error) => {
             report::error(&error);
-            ExitCode::from(status::of(&error))
+            status.max(status::SYSTEM)
         }
-    }
+        None => status,
+    })
 }

@@ -1,8 +1,9 @@
 //! Where results go: patterns for the names of output files, and lines on standard output.
 
 use std::collections::{HashMap, HashSet};
-use std::io::Write;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 use etendue::error::{Error, Result};
 use etendue::image;
@@ -124,9 +125,25 @@ pub(super) fn check_writable<'a>(outputs: impl Iterator<Item = &'a Path>) -> Res
     Ok(())
 }
 
-/// A line on standard output. A reader that has gone away is no error of ours.
+/// Why standard output could not be written, once it could not.
+static FAILED: OnceLock<io::Error> = OnceLock::new();
+
+/// A line on standard output. A reader that has gone away is no error of ours; what else goes wrong is told by
+/// [`failure`].
 pub(super) fn line(text: &str) {
-    let _ = writeln!(std::io::stdout(), "{text}");
+    match writeln!(io::stdout(), "{text}") {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
+            // The first of them is the one that is told.
+            let _ = FAILED.set(error);
+        }
+        _ => {}
+    }
+}
+
+/// What went wrong with standard output, if anything did.
+pub(super) fn failure() -> Option<Error> {
+    let path = Path::new("standard output");
+    FAILED.get().map(|e| Error::system("write", path, e))
 }
 
 #[cfg(test)]

@@ -1,7 +1,13 @@
 //! The values of options: from text to numbers, windows, sizes and frames.
 
+use std::num::NonZeroUsize;
+use std::thread;
+
+use clap::builder::RangedI64ValueParser;
 use etendue::relight::Weight;
+use etendue::sampler::MAX_SAMPLES;
 use etendue::sensor::Window;
+use glam::DVec3;
 
 type Parsed<T> = Result<T, String>;
 
@@ -11,6 +17,22 @@ fn numbers<const N: usize>(text: &str, separator: char) -> Option<[u32; N]> {
         .map(|t| t.trim().parse().ok())
         .collect::<Option<_>>()?;
     numbers.try_into().ok()
+}
+
+/// Samples a pixel.
+pub(super) fn spp() -> RangedI64ValueParser<u32> {
+    clap::value_parser!(u32).range(1..=MAX_SAMPLES.into())
+}
+
+/// How many threads: up to eight a processor, and up to 256 on any machine.
+pub(super) fn threads(text: &str) -> Parsed<NonZeroUsize> {
+    const ANYWHERE: usize = 256;
+    let processors = thread::available_parallelism().map_or(1, NonZeroUsize::get);
+    let most = ANYWHERE.max(8 * processors);
+    let number: usize = text.parse().map_err(|_| "write a number such as 8")?;
+    (NonZeroUsize::new(number).filter(|n| n.get() <= most)).ok_or_else(|| {
+        format!("{text} is not between 1 and {most}; this machine has {processors} processors")
+    })
 }
 
 /// `640x480`
@@ -29,6 +51,17 @@ pub(super) fn crop(text: &str) -> Parsed<Window> {
         width,
         height,
     })
+}
+
+/// `1,-2,0.5`
+pub(super) fn point(text: &str) -> Parsed<DVec3> {
+    let numbers: Option<Vec<f64>> = text.split(',').map(|t| t.trim().parse().ok()).collect();
+    match numbers.as_deref() {
+        Some(&[x, y, z]) if x.is_finite() && y.is_finite() && z.is_finite() => {
+            Ok(DVec3::new(x, y, z))
+        }
+        _ => Err("write it as X,Y,Z, such as 0,1.5,0".to_owned()),
+    }
 }
 
 /// `name=value`

@@ -10,9 +10,11 @@ use etendue::error::{Error, Result};
 use etendue::profile::{self, Axis, Comparison, Effort, Profile, Settings, Subject, Watch};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
+use super::memory::MemoryArguments;
+use super::overrides::MethodArguments;
 use super::scene::SceneArguments;
 use super::stop::Stop;
-use super::{growth, memory, output, parse, status};
+use super::{growth, output, parse, status};
 
 /// Measure what rendering costs as it grows
 ///
@@ -32,6 +34,8 @@ pub(super) struct Arguments {
     input: Option<PathBuf>,
     #[command(flatten)]
     scene: SceneArguments,
+    #[command(flatten)]
+    method: MethodArguments,
     /// Sweep these only: P (pixels), O (triangles), L (lights), N (bands), samples, depth, threads
     #[arg(long, value_name = "AXES", value_delimiter = ',')]
     sweep: Vec<Axis>,
@@ -45,11 +49,10 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
     rounds: Option<u32>,
     /// The most threads; one a processor by default. All sweeps but that of threads take one
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = parse::threads)]
     threads: Option<NonZeroUsize>,
-    /// Refuse to take more memory, such as 8G; "none" for no limit. By default 90 % of what is free
-    #[arg(long, value_name = "SIZE", value_parser = parse::bytes)]
-    memory_limit: Option<u64>,
+    #[command(flatten)]
+    memory: MemoryArguments,
     /// Write profile.html (all in one page), profile.json, profile.csv and the plots (.svg) to this folder
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
@@ -96,9 +99,9 @@ impl Arguments {
             },
             threads: self.threads.unwrap_or(processors),
             rounds: self.rounds.map(|n| n as usize),
-            memory_limit: self
-                .memory_limit
-                .or_else(|| memory::available().map(|free| free / 10 * 9)),
+            overrides: self.method.overrides(),
+            sensor: self.method.sensor()?,
+            memory_limit: self.memory.limit(),
         })
     }
 }

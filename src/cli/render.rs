@@ -1,31 +1,29 @@
 //! `etendue render`: scenes or bare meshes to images.
 
-use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
 use etendue::accel::{Build, Method};
 use etendue::compare::map::{Map, robust_top};
-use etendue::description::{self, Description, Value};
+use etendue::description::{self, Description};
 use etendue::display;
 use etendue::error::{Error, Problem, Result};
 use etendue::image;
 use etendue::render::{
-    self, Adaptive, Checkpoint, Colors, Options, Overrides, Progress, Rendered, Session, is_mesh,
+    Adaptive, Checkpoint, Options, Progress, Rendered, Session, is_mesh, sensors,
 };
-use etendue::sensor::Window;
-use glam::DMat4;
+use glam::DVec3;
 
-use super::batch::{Batch, Item, Request, Sensors};
-use super::memory;
+use super::batch::{Batch, Item, Request};
+use super::memory::{RUN, RunArguments};
+use super::overrides::{IMAGE, ImageArguments};
 use super::parse::{self, Frames};
 use super::progress::Bar;
-use super::scene::{SceneArguments, sensors};
+use super::scene::SceneArguments;
 use super::stop::Stop;
 use super::summary::{self, Ending, Style};
-use super::turntable::turn;
-use super::{output, report, status};
+use super::{output, report, status, turntable};
 
 /// Render scenes or meshes to images
 ///
@@ -48,30 +46,11 @@ pub(super) struct Arguments {
     #[command(flatten)]
     scene: SceneArguments,
 
-    /// Samples a pixel, in place of the scene's sample_count; the sampler may round up
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = IMAGE)]
-    spp: Option<u32>,
+    #[command(flatten)]
+    image: ImageArguments,
     /// Seed of the random numbers: one seed, one image
     #[arg(long, default_value_t = 0, value_name = "N", help_heading = IMAGE)]
     seed: u64,
-    /// Size of the film in pixels
-    #[arg(long, value_name = "WxH", value_parser = parse::size, help_heading = IMAGE)]
-    size: Option<(u32, u32)>,
-    /// Render only this part of the film; equals the same pixels of the full image
-    #[arg(long, value_name = "X,Y,W,H", value_parser = parse::crop, help_heading = IMAGE)]
-    crop: Option<Window>,
-    /// Integrator, in place of the scene's
-    #[arg(long, value_name = "NAME", help_heading = IMAGE)]
-    integrator: Option<String>,
-    /// The integrator's max_depth: 1 is emission only, 2 direct light, -1 no limit
-    #[arg(long, value_name = "N", allow_negative_numbers = true, help_heading = IMAGE)]
-    max_depth: Option<i64>,
-    /// Sampler, in place of the scene's
-    #[arg(long, value_name = "NAME", help_heading = IMAGE)]
-    sampler: Option<String>,
-    /// Render N spectral bands over 360-830 nm instead of RGB; the image's RGB is made from them
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=32), help_heading = IMAGE)]
-    bands: Option<u8>,
 
     /// Give each part of the image as many samples as its noise asks for: none is noisier than T, the standard
     /// error of a pixel's luminance L divided by the square root of L. EXR gets the channels "samples" and "error"
@@ -90,9 +69,10 @@ pub(super) struct Arguments {
     /// Let the camera go around the scene in N frames, all of them unless --frames says which
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000), help_heading = SERIES)]
     turntable: Option<u32>,
-    /// Look through this sensor: its number from 0, its id, or "all" for one image each
-    #[arg(long, value_name = "N|ID|all", value_parser = |text: &str| Ok::<_, String>(Sensors::from(text)), help_heading = SERIES)]
-    sensor: Option<Sensors>,
+    /// The point that --turntable goes around, instead of the one that the camera looks at (the target of its lookat,
+    /// or the scene's centre)
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse::point, allow_hyphen_values = true, requires = "turntable", help_heading = SERIES)]
+    pivot: Option<DVec3>,
     /// Leave out images whose file is there, unless a checkpoint lies beside it
     #[arg(long, help_heading = SERIES)]
     skip_existing: bool,
@@ -106,12 +86,8 @@ pub(super) struct Arguments {
     /// Go on from OUT.checkpoint where it is there, to the same image as without interruption
     #[arg(long, help_heading = RUN)]
     resume: bool,
-    /// Refuse to take more memory, such as 8G; "none" for no limit. By default 90 % of what is free
-    #[arg(long, value_name = "SIZE", value_parser = parse::bytes, help_heading = RUN)]
-    memory_limit: Option<u64>,
-    /// Threads; one a processor by default. The image does not depend on it
-    #[arg(long, value_name = "N", help_heading = RUN)]
-    threads: Option<NonZeroUsize>,
+    #[command(flatten)]
+    run: RunArguments,
     /// How rays find shapes; the image is the same
     #[arg(long, value_enum, default_value_t = Accel::Tree, help_heading = RUN)]
     accel: Accel,
@@ -139,10 +115,8 @@ pub(super) struct Arguments {
     heatmap: Option<String>,
 }
 
-const IMAGE: &str = "The image";
 const ADAPTIVE: &str = "Adaptive sampling";
 const SERIES: &str = "Series of images";
-const RUN: &str = "The run";
 const TELL: &str = "What is told";
 
 const EXAMPLES: &str = "\
@@ -190,8 +164,8 @@ impl Arguments {
         Options {
             scene: item.input.display().to_string(),
             seed: self.seed,
-            threads: self.threads,
-            colors: self.bands.map_or(Colors::Rgb, |n| Colors::Bands(n.into())),
+            threads: self.run.threads,
+            colors: self.image.colors(),
             adaptive: self.noise_threshold.map(|noise_threshold| Adaptive {
                 noise_threshold,
                 min_spp: self.min_spp.unwrap_or(32).min(self.max_spp),
@@ -215,17 +189,6 @@ impl Arguments {
         }
     }
 
-    fn overrides(&self) -> Overrides {
-        Overrides {
-            spp: self.spp,
-            sampler: self.sampler.clone(),
-            size: self.size,
-            crop: self.crop,
-            integrator: self.integrator.clone(),
-            max_depth: self.max_depth,
-        }
-    }
-
     fn style(&self) -> Style {
         Style {
             quiet: self.quiet,
@@ -238,14 +201,15 @@ impl Arguments {
         self.skip_existing && item.output.exists() && !item.checkpoint().exists()
     }
 
-    fn batch(&self) -> Result<Batch> {
+    fn batch(&self, memory_limit: Option<u64>) -> Result<Batch> {
         let request = Request {
             inputs: &self.inputs,
             frames: self.frames.or(self.turntable.map(Frames::first)),
-            sensors: self.sensor.as_ref(),
+            sensors: self.image.sensors(),
             output: &self.output,
             heatmap: self.heatmap.as_deref(),
             scene: &self.scene,
+            memory_limit,
         };
         request.batch()
     }
@@ -261,7 +225,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         return Err(Error::input(message));
     }
     let stop = Stop::on_signals()?;
-    let Batch { items, failed } = arguments.batch()?;
+    let memory_limit = arguments.run.memory.limit();
+    let Batch { items, failed } = arguments.batch(memory_limit)?;
     output::check_distinct((items.iter()).flat_map(|i| i.files().map(|file| (file, i.name()))))?;
     let wanted = items.iter().filter(|item| !arguments.skips(item));
     output::check_writable(wanted.flat_map(Item::files))?;
@@ -269,9 +234,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         arguments,
         session: Session::default(),
         read: None,
-        memory_limit: arguments
-            .memory_limit
-            .or_else(|| memory::available().map(|free| free / 10 * 9)),
+        memory_limit,
         told: Vec::new(),
         stop,
     };
@@ -343,29 +306,26 @@ impl Series<'_> {
     fn look(
         &mut self,
         item: &Item,
-        (as_read, mut description): (description::Options, Description),
+        (as_read, description): (description::Options, Description),
         options: &Options,
         bar: &Bar,
     ) -> Result<Rendered> {
         let sensor = sensors(&description).get(item.sensor).copied();
         let turned = self.arguments.turntable.zip(item.frame).zip(sensor);
-        let mut pose = None;
+        let mut posed = description.clone();
         if let Some(((count, frame), sensor)) = turned {
             let bounds = self.session.bounds(&description, options, bar)?;
-            let before = description.get(sensor, "to_world").cloned();
-            pose = Some(before.unwrap_or(Value::Transform(DMat4::IDENTITY))).map(|p| (sensor, p));
+            let pivot = self.arguments.pivot;
+            let center = pivot.unwrap_or_else(|| turntable::pivot(&description, sensor, &bounds));
             let turns = frame as f64 / f64::from(count);
-            turn(&mut description, sensor, &bounds, turns);
+            turntable::turn(&mut posed, sensor, center, turns);
         }
-        let mut rendered = self.session.render(&description, options, bar);
+        let mut rendered = self.session.render(&posed, options, bar);
         if let (Some(path), Ok(_), false) = (&item.heatmap, &rendered, bar.stop()) {
-            let drawn = self.heatmap(&description, path, options, bar);
+            let drawn = self.heatmap(&posed, path, options, bar);
             rendered = rendered.and_then(|rendered| drawn.map(|()| rendered));
         }
         if is_mesh(&item.input) {
-            if let Some((sensor, pose)) = pose {
-                description.set(sensor, "to_world", pose);
-            }
             self.read = Some((item.input.clone(), as_read, description));
         }
         rendered
@@ -404,11 +364,9 @@ impl Series<'_> {
         {
             return Ok((options, description));
         }
-        if bare {
-            render::check_mesh(&item.input, self.memory_limit)?;
-        }
-        let mut description = scene.describe(&item.input, &options, &mut self.session)?;
-        self.arguments.overrides().apply(&mut description);
+        let (limit, session) = (self.memory_limit, &mut self.session);
+        let mut description = scene.describe(&item.input, &options, limit, session)?;
+        self.arguments.image.overrides().apply(&mut description);
         Ok((options, description))
     }
 

@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use clap::{Args, ValueEnum};
-use etendue::description::{Description, Kind, NodeId, Options};
+use etendue::description::{Description, Options};
 use etendue::error::{Error, Result};
 use etendue::render::{self, BareMesh, Session, UpAxis};
 
@@ -12,17 +12,24 @@ use super::output::with_frame;
 use super::parse;
 
 /// How scenes are read.
-#[derive(Args, Debug)]
-pub(super) struct SceneArguments {
-    /// Value of a $name parameter of the scene; {frame} stands for the frame's number
+#[derive(Args, Clone, Debug)]
+pub(super) struct ReadArguments {
+    /// Value of a $name parameter of the scene; {frame} stands for the frame's number, where there are frames
     #[arg(short = 'D', value_name = "NAME=VALUE", value_parser = parse::define)]
     define: Vec<(String, String)>,
-    /// Which way is up in a bare mesh
-    #[arg(long, value_enum, default_value_t = Up::Y)]
-    up: Up,
     /// Refuse what Mitsuba 3 would not read
     #[arg(long)]
     strict: bool,
+}
+
+/// How scenes and bare meshes are read.
+#[derive(Args, Clone, Debug)]
+pub(super) struct SceneArguments {
+    #[command(flatten)]
+    read: ReadArguments,
+    /// Which way is up in a bare mesh
+    #[arg(long, value_enum, default_value_t = Up::Y)]
+    up: Up,
 }
 
 /// Which way is up.
@@ -41,7 +48,7 @@ pub(super) fn is_scene(input: &Path) -> bool {
         .is_some_and(|e| e.eq_ignore_ascii_case("xml"))
 }
 
-impl SceneArguments {
+impl ReadArguments {
     /// The options for a frame of a scene.
     pub(super) fn options(&self, frame: Option<i64>) -> Options {
         let Some(frame) = frame else {
@@ -58,16 +65,25 @@ impl SceneArguments {
             strict: self.strict,
         }
     }
+}
 
-    /// The scene in the file, or around the mesh in it; the session has that mesh then.
+impl SceneArguments {
+    /// The options for a frame of a scene.
+    pub(super) fn options(&self, frame: Option<i64>) -> Options {
+        self.read.options(frame)
+    }
+
+    /// The scene in the file, or around the mesh in it, which may take so many bytes; the session has that mesh then.
     pub(super) fn describe(
         &self,
         input: &Path,
         options: &Options,
+        memory_limit: Option<u64>,
         session: &mut Session,
     ) -> Result<Description> {
         self.check(input)?;
         if render::is_mesh(input) {
+            render::check_mesh(input, memory_limit)?;
             let BareMesh { description, mesh } =
                 render::describe_mesh(input, self.up_axis(), options)?;
             session.give(mesh);
@@ -92,9 +108,4 @@ impl SceneArguments {
             Up::Z => UpAxis::Z,
         }
     }
-}
-
-/// The sensors of a scene, in file order.
-pub(super) fn sensors(description: &Description) -> Vec<NodeId> {
-    description.children_of(description.root().node_id(), Kind::Sensor)
 }

@@ -1,13 +1,18 @@
 //! Signals: the first of Ctrl-C, SIGTERM (as batch systems send it) and SIGHUP asks the render to come to
 //! an end, a second one ends the process at once.
 
+use std::io;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
 use std::time::Instant;
 
 use etendue::error::{Error, Result};
+use etendue::file;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
+use signal_hook::iterator::Signals;
 
 use super::status;
 
@@ -22,11 +27,7 @@ impl Stop {
     /// Listens to the signals from now on.
     pub(super) fn on_signals() -> Result<Self> {
         let signalled = Arc::new(AtomicBool::new(false));
-        let mut signals = vec![SIGINT, SIGTERM];
-        #[cfg(unix)]
-        signals.push(signal_hook::consts::SIGHUP);
-        signals.retain(|signal| !is_ignored(*signal));
-        for signal in signals {
+        for signal in wanted() {
             // In this order: the flag is not set yet when the first signal asks for it.
             flag::register_conditional_shutdown(
                 signal,
@@ -34,12 +35,27 @@ impl Stop {
                 signalled.clone(),
             )
             .and_then(|_| flag::register(signal, signalled.clone()))
-            .map_err(|e| Error::input(format!("cannot listen to signal {signal}: {e}")))?;
+            .map_err(refused)?;
         }
         Ok(Self {
             signalled,
             deadline: None,
         })
+    }
+
+    /// Ends the process at the first signal, without what it has begun to write as one of `outputs`: for what
+    /// cannot be finished early.
+    pub(super) fn without_a_trace(outputs: Vec<PathBuf>) -> Result<()> {
+        let mut signals = Signals::new(wanted()).map_err(refused)?;
+        thread::spawn(move || {
+            if signals.forever().next().is_some() {
+                outputs
+                    .iter()
+                    .for_each(|path| file::remove_unfinished(path));
+                std::process::exit(status::INTERRUPTED.into());
+            }
+        });
+        Ok(())
     }
 
     /// The same, and asks to stop at `deadline` too.
@@ -59,6 +75,19 @@ impl Stop {
     pub(super) fn asked(&self) -> bool {
         self.signalled() || self.deadline.is_some_and(|d| Instant::now() >= d)
     }
+}
+
+/// The signals that ask for an end.
+fn wanted() -> Vec<i32> {
+    let mut signals = vec![SIGINT, SIGTERM];
+    #[cfg(unix)]
+    signals.push(signal_hook::consts::SIGHUP);
+    signals.retain(|signal| !is_ignored(*signal));
+    signals
+}
+
+fn refused(error: io::Error) -> Error {
+    Error::input(format!("cannot listen to signals: {error}"))
 }
 
 /// Whether the caller arranged for a signal to be ignored, as `nohup` does with SIGHUP: then it stays so.

@@ -1,18 +1,28 @@
-//! A camera that goes around the scene: its pose is turned about the vertical axis through the scene's
-//! centre. The vertical axis is the axis of the world that is nearest to the camera's own, so that a
+//! A camera that goes around a point, as a rule the one that it looks at: its pose is turned about the vertical
+//! axis through it. The vertical axis is the axis of the world that is nearest to the camera's own, so that a
 //! camera that looks down a little goes around in a level circle.
 
 use etendue::description::{Description, NodeId, Value};
 use etendue::shape::Bounds;
 use glam::{DMat4, DVec3, DVec4};
 
-/// Turns the sensor by `turns` (1 is all around), counter-clockwise as seen from above.
-pub(super) fn turn(description: &mut Description, sensor: NodeId, bounds: &Bounds, turns: f64) {
+/// The point that a sensor looks at: the target of its `<lookat>`, else the centre of the scene's `bounds`, the origin
+/// of a scene without any.
+pub(super) fn pivot(description: &Description, sensor: NodeId, bounds: &Bounds) -> DVec3 {
+    let center = || match bounds.is_empty() {
+        true => DVec3::ZERO,
+        false => 0.5 * (bounds.min.as_dvec3() + bounds.max.as_dvec3()),
+    };
+    let target = description.target(sensor, "to_world");
+    target.unwrap_or_else(center)
+}
+
+/// Turns the sensor by `turns` (1 is all around) about `center`, counter-clockwise as seen from above.
+pub(super) fn turn(description: &mut Description, sensor: NodeId, center: DVec3, turns: f64) {
     let turns = turns.rem_euclid(1.0);
-    if turns == 0.0 || bounds.is_empty() {
+    if turns == 0.0 {
         return;
     }
-    let center = 0.5 * (bounds.min.as_dvec3() + bounds.max.as_dvec3());
     let turned = match description.get(sensor, "to_world") {
         Some(Value::Animation(keyframes)) => {
             let rotation = rotation(&keyframes[0].1, center, turns);
@@ -66,7 +76,8 @@ mod tests {
             min: Vec3::new(0.0, -5.0, -1.0),
             max: Vec3::new(2.0, 5.0, 1.0),
         };
-        turn(&mut scene, sensor, &bounds, turns);
+        let center = pivot(&scene, sensor, &bounds);
+        turn(&mut scene, sensor, center, turns);
         match scene.get(sensor, "to_world") {
             Some(Value::Transform(pose)) => *pose,
             other => panic!("{other:?}"),
@@ -96,6 +107,18 @@ mod tests {
         let to_world = "<transform name='to_world'><lookat origin='1, 6, 2' target='1, 0, 0' up='0, 0, 1'/></transform>";
         let origin = turned(to_world, 0.5).w_axis.truncate();
         assert!((origin - DVec3::new(1.0, -6.0, 2.0)).length() < 1e-9);
+    }
+
+    #[test]
+    fn the_pivot_is_what_the_camera_looks_at_wherever_the_scene_is() {
+        let to_world =
+            "<transform name='to_world'><lookat origin='5, 0, 3' target='5, 0, -1' up='0, 1, 0'/>
+            <translate y='2'/></transform>";
+        let origin = turned(to_world, 0.5).w_axis.truncate();
+        assert!(
+            (origin - DVec3::new(5.0, 2.0, -5.0)).length() < 1e-9,
+            "{origin}"
+        );
     }
 
     #[test]

@@ -160,6 +160,7 @@ fn lines(crosscheck: &Crosscheck) -> Vec<(&'static str, String)> {
         lines.push(("memory", format!("{ours} here, {theirs} in Mitsuba")));
     }
     lines.extend(crosscheck.notes.iter().map(|note| ("note", note.clone())));
+    lines.push(("python", crosscheck.python.clone()));
     lines
 }
 

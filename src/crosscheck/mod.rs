@@ -17,8 +17,10 @@ use std::time::Duration;
 
 use serde::Serialize;
 
+use crate::render::Overrides;
+
 pub use cost::{Cost, Time};
-pub use python::{VARIABLE, find_python};
+pub use python::{Python, VARIABLE, find_python, home, install};
 pub use run::{Crosscheck, crosscheck};
 pub use serve::serve;
 
@@ -47,8 +49,9 @@ pub struct Settings {
     /// The `etendue` program, and the arguments with which it calls [`serve`].
     pub etendue: (PathBuf, Vec<String>),
     /// The Python that has Mitsuba: see [`find_python`].
-    pub python: PathBuf,
-    /// A folder of Python files that register plugins with Mitsuba.
+    pub python: Python,
+    /// A folder of Python files that register plugins with Mitsuba, in place of Étendue's own: `phong`, `ambient`,
+    /// `plane` and `cone`.
     pub plugins: Option<PathBuf>,
     /// Mitsuba's variant, such as `scalar_rgb`.
     pub variant: String,
@@ -58,12 +61,12 @@ pub struct Settings {
     pub reference: Option<PathBuf>,
     /// Values of the scene's parameters.
     pub defines: Vec<(String, String)>,
-    /// Width and height in place of the film's.
-    pub size: Option<(u32, u32)>,
-    /// Samples a pixel and seed, in place of the sampler's.
-    pub spp: Option<u32>,
-    /// In place of the integrator's.
-    pub max_depth: Option<i64>,
+    /// Whether Étendue refuses what Mitsuba would not read.
+    pub strict: bool,
+    /// Values in place of the scene's own, on both sides.
+    pub overrides: Overrides,
+    /// Which of the scene's sensors, by id or number; the first where absent.
+    pub sensor: Option<String>,
     /// How often each side renders the scene, at least twice.
     pub seeds: u32,
     /// The first of the seeds; those that follow are one greater each.

@@ -7,6 +7,8 @@ use std::path::PathBuf;
 use serde::{Deserialize, Serialize};
 
 use super::cost::Time;
+use crate::render::Overrides;
+use crate::sensor::Window;
 
 /// What is to be rendered, and how. Both sides get the same order and leave aside what is the other's.
 #[derive(Clone, Debug, Deserialize, Serialize)]
@@ -15,12 +17,22 @@ pub(super) struct Order {
     pub(super) scene: PathBuf,
     /// Values of the scene's parameters.
     pub(super) defines: Vec<(String, String)>,
+    /// Whether Étendue refuses what Mitsuba would not read.
+    pub(super) strict: bool,
     /// Width and height in place of the film's.
     pub(super) size: Option<(u32, u32)>,
+    /// The part of the film: left, top, width, height.
+    pub(super) crop: Option<[u32; 4]>,
     /// In place of the sampler's count.
     pub(super) spp: Option<u32>,
+    /// Sampler plugin.
+    pub(super) sampler: Option<String>,
+    /// Integrator plugin.
+    pub(super) integrator: Option<String>,
     /// In place of the integrator's.
     pub(super) max_depth: Option<i64>,
+    /// Id or number of the sensor; the first where absent.
+    pub(super) sensor: Option<String>,
     /// One a processor where absent.
     pub(super) threads: Option<u32>,
     /// Étendue's colour model; RGB where absent.
@@ -28,9 +40,31 @@ pub(super) struct Order {
     /// Mitsuba's variant.
     pub(super) variant: String,
     /// A folder of Python files that register plugins with Mitsuba.
-    pub(super) plugins: Option<PathBuf>,
+    pub(super) plugins: PathBuf,
+    /// Whether they are Étendue's own: one that lacks a package of Python is passed over.
+    pub(super) own_plugins: bool,
     /// Where images go.
     pub(super) folder: PathBuf,
+}
+
+impl Order {
+    /// For Étendue.
+    pub(super) fn overrides(&self) -> Overrides {
+        let crop = |[x, y, width, height]: [u32; 4]| Window {
+            x,
+            y,
+            width,
+            height,
+        };
+        Overrides {
+            spp: self.spp,
+            sampler: self.sampler.clone(),
+            size: self.size,
+            crop: self.crop.map(crop),
+            integrator: self.integrator.clone(),
+            max_depth: self.max_depth,
+        }
+    }
 }
 
 /// What a worker answers.

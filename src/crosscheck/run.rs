@@ -2,7 +2,7 @@
 //! the other works and what slows it for a while slows both. The side that begins changes with every seed.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Instant;
 
@@ -19,6 +19,12 @@ use crate::error::Error;
 
 /// Mitsuba's side.
 const WORKER: &str = include_str!("worker.py");
+/// What Mitsuba is taught of Étendue's plugins.
+const PLUGINS: [(&str, &str); 3] = [
+    ("ambient.py", include_str!("../../tools/mitsuba/ambient.py")),
+    ("phong.py", include_str!("../../tools/mitsuba/phong.py")),
+    ("shapes.py", include_str!("../../tools/mitsuba/shapes.py")),
+];
 
 /// A scene that both sides have rendered.
 #[derive(Clone, Debug, Serialize)]
@@ -31,6 +37,8 @@ pub struct Crosscheck {
     pub seeds: u32,
     /// What is not the same on both sides, or not as the scene has it.
     pub notes: Vec<String>,
+    /// The Python that ran Mitsuba, and who named it.
+    pub python: String,
     /// What Étendue took.
     pub etendue: Cost,
     /// What Mitsuba took.
@@ -55,16 +63,27 @@ pub fn crosscheck(
         .prefix("etendue-crosscheck-")
         .tempdir()
         .map_err(|e| Error::system("write in", &std::env::temp_dir(), &e))?;
+    let plugins = match &settings.plugins {
+        Some(plugins) => plugins.clone(),
+        None => own_plugins(folder.path())?,
+    };
+    let overrides = &settings.overrides;
     let order = |scene: &Path| Order {
         scene: scene.to_owned(),
         defines: settings.defines.clone(),
-        size: settings.size,
-        spp: settings.spp,
-        max_depth: settings.max_depth,
+        strict: settings.strict,
+        size: overrides.size,
+        crop: overrides.crop.map(|w| [w.x, w.y, w.width, w.height]),
+        spp: overrides.spp,
+        sampler: overrides.sampler.clone(),
+        integrator: overrides.integrator.clone(),
+        max_depth: overrides.max_depth,
+        sensor: settings.sensor.clone(),
         threads: settings.threads,
         bands: settings.bands,
         variant: settings.variant.clone(),
-        plugins: settings.plugins.clone(),
+        plugins: plugins.clone(),
+        own_plugins: settings.plugins.is_none(),
         folder: folder.path().to_owned(),
     };
     if let Some(folder) = &settings.keep {
@@ -79,14 +98,14 @@ pub fn crosscheck(
     let etendue = Runner::start(Side::Etendue, command, &order(scene), settings, watch)?;
     watch.at(Side::Mitsuba, 0, total);
     let script = folder.path().join("worker.py");
-    fs::write(&script, WORKER).map_err(|e| Error::system("write", &script, &e))?;
-    let mut command = Command::new(&settings.python);
+    write(&script, WORKER)?;
+    let mut command = Command::new(&settings.python.path);
     command.arg(&script);
     let other = order(settings.reference.as_deref().unwrap_or(scene));
     let mitsuba = Runner::start(Side::Mitsuba, command, &other, settings, watch);
     let mitsuba = mitsuba.map_err(|failure| match failure {
         Failure::Died { words, .. } if words.contains("No module named 'mitsuba'") => {
-            Failure::NoMitsuba(settings.python.clone())
+            Failure::NoMitsuba(settings.python.path.clone())
         }
         other => other,
     })?;
@@ -118,11 +137,26 @@ pub fn crosscheck(
         spp,
         seeds: settings.seeds,
         notes,
+        python: settings.python.to_string(),
         seconds_ratio: cost::ratio(&mitsuba, &etendue, |t| Some(t.seconds)),
         cpu_ratio: cost::ratio(&mitsuba, &etendue, |t| t.cpu),
         etendue,
         mitsuba,
     })
+}
+
+/// Writes the plugins that Étendue has for Mitsuba to a folder in `folder`.
+fn own_plugins(folder: &Path) -> Result<PathBuf, Failure> {
+    let plugins = folder.join("plugins");
+    fs::create_dir(&plugins).map_err(|e| Error::system("make", &plugins, &e))?;
+    for (name, text) in PLUGINS {
+        write(&plugins.join(name), text)?;
+    }
+    Ok(plugins)
+}
+
+fn write(path: &Path, text: &str) -> Result<(), Failure> {
+    fs::write(path, text).map_err(|e| Error::system("write", path, &e).into())
 }
 
 /// What was changed about the scene, and a difference that the scene does not have.

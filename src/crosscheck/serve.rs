@@ -10,7 +10,7 @@ use crate::description::{self, Description};
 use crate::display;
 use crate::error::{Error, Result};
 use crate::image::Metadata;
-use crate::render::{Colors, Options, Overrides, Session, Silent};
+use crate::render::{Colors, Options, Session, Silent, find_sensor};
 
 /// Answers the order and the seeds on `input` until it ends.
 ///
@@ -67,19 +67,19 @@ impl Scene {
         let clock = Clock::start();
         let read = description::Options {
             defines: order.defines.clone(),
+            strict: order.strict,
             ..description::Options::default()
         };
         let mut description = Description::read(&order.scene, &read)?;
-        let overrides = Overrides {
-            spp: order.spp,
-            size: order.size,
-            max_depth: order.max_depth,
-            ..Overrides::default()
+        let sensor = match &order.sensor {
+            Some(name) => find_sensor(&description, name)?,
+            None => 0,
         };
-        overrides.apply(&mut description);
+        order.overrides().apply(&mut description);
         let options = Options {
             threads: order.threads.and_then(|n| NonZeroUsize::new(n as usize)),
             colors: order.bands.map_or(Colors::Rgb, |n| Colors::Bands(n.into())),
+            sensor,
             ..Options::default()
         };
         let mut session = Session::default();

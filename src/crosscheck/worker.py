@@ -19,6 +19,13 @@ REGISTRIES = {'register_bsdf': 'BSDF', 'register_emitter': 'Emitter', 'register_
               'register_shape': 'Shape', 'register_texture': 'Texture'}
 
 
+CROP = ('crop_offset_x', 'crop_offset_y', 'crop_width', 'crop_height')
+
+# What stays where one plugin takes another's place, and integrators that do not read all of it.
+SHARED = {'sample_count', 'seed', 'max_depth', 'rr_depth', 'hide_emitters'}
+WITHOUT_DEPTH = {'aov', 'depth', 'direct', 'moment'}
+
+
 class Refused(Exception):
     """The scene asks for what Mitsuba does not have."""
 
@@ -33,9 +40,10 @@ class Clock:
         return {'seconds': time.perf_counter() - self.wall, 'cpu': time.process_time() - self.cpu}
 
 
-def import_plugins(mi, folder):
+def import_plugins(mi, folder, own):
     """Runs every Python file of a folder: each registers what it adds to Mitsuba. The answer is the kinds of
-    what it adds by name, for Mitsuba's own list tells those of `scalar_rgb` alone."""
+    what it adds by name, for Mitsuba's own list tells those of `scalar_rgb` alone. Of Étendue's own, one that lacks
+    a package is passed over: most scenes do not ask for it."""
     kinds = {}
 
     def listed(name, register, kind):
@@ -51,7 +59,12 @@ def import_plugins(mi, folder):
         spec = importlib.util.spec_from_file_location(path.stem, path)
         module = importlib.util.module_from_spec(spec)
         sys.modules.setdefault(path.stem, module)
-        spec.loader.exec_module(module)
+        try:
+            spec.loader.exec_module(module)
+        except ModuleNotFoundError as error:
+            if not own:
+                raise
+            print(f'{path.name} is left out: {error}', file=sys.stderr)
     return kinds
 
 
@@ -137,6 +150,8 @@ class Parsed:
         """Puts the order's values where the scene's stand, as `etendue render` does with its options."""
         root = 0
         integrator = self.child(root, 'Integrator', 'path')
+        if order['integrator'] is not None:
+            self.replace(integrator, order['integrator'])
         if order['max_depth'] is not None:
             while self.children(integrator, 'Integrator'):
                 integrator = self.children(integrator, 'Integrator')[0]
@@ -145,9 +160,36 @@ class Parsed:
             film = self.child(sensor, 'Film', 'hdrfilm')
             if order['size'] is not None:
                 self.props(film)['width'], self.props(film)['height'] = order['size']
+            if order['crop'] is not None:
+                for name, value in zip(CROP, order['crop']):
+                    self.props(film)[name] = value
             sampler = self.child(sensor, 'Sampler', 'independent')
+            if order['sampler'] is not None:
+                self.replace(sampler, order['sampler'])
             if order['spp'] is not None:
                 self.props(sampler)['sample_count'] = order['spp']
+
+    def replace(self, node, plugin):
+        """Makes a node another plugin, which keeps of the properties what both read."""
+        props, other = self.props(node), self.mi.Properties(plugin)
+        if plugin == props.plugin_name():
+            return
+        shared = SHARED - {'max_depth', 'rr_depth'} if plugin in WITHOUT_DEPTH else SHARED
+        for name in props.keys():
+            if name in shared or isinstance(props[name], self.mi.Properties.ResolvedReference):
+                other[name] = props[name]
+        self.state.nodes[node].props = other
+
+    def sensor(self, wanted):
+        """The number of the sensor that is meant by its id or, where none has it, by its number."""
+        ids = [self.props(node).id() for node in self.children(0, 'Sensor')]
+        if wanted is None:
+            return 0
+        if wanted in ids:
+            return ids.index(wanted)
+        if wanted.isdecimal() and int(wanted) < len(ids):
+            return int(wanted)
+        raise Refused(f'Mitsuba finds no sensor "{wanted}" in the file')
 
     def build(self):
         # What `mi.load_file` does too. It puts the whole scene into one node, so it comes last.
@@ -165,18 +207,30 @@ class Parsed:
 
 
 def load(mi, order, added):
-    """The scene, and what was done to it."""
+    """The scene, the number of the sensor that is meant, and what was done to the scene."""
     try:
         parsed = Parsed(mi, order, added)
+        sensor = parsed.sensor(order['sensor'])
+        parsed.override(order)
         parsed.disambiguate()
         parsed.replace_samplers()
         parsed.refuse_missing()
-        parsed.override(order)
-        return parsed.build(), parsed.notes
+        return parsed.build(), sensor, parsed.notes
     except Refused:
         raise
     except Exception as error:
         raise Refused(f'Mitsuba refuses the scene: {error}') from error
+
+
+def write(bitmap, path):
+    """Writes an EXR. In a pool of one thread Mitsuba's encoder waits for ever for somebody else to do the work."""
+    import drjit
+    count = drjit.thread_count()
+    if count < 2:
+        drjit.set_thread_count(2)
+    bitmap.write(path)
+    if count < 2:
+        drjit.set_thread_count(count)
 
 
 def main():
@@ -198,25 +252,25 @@ def main():
     if order['threads'] is not None:
         import drjit
         drjit.set_thread_count(order['threads'])
-    added = import_plugins(mi, order['plugins']) if order['plugins'] is not None else {}
+    added = import_plugins(mi, order['plugins'], order['own_plugins'])
 
     clock = Clock()
     try:
-        scene, notes = load(mi, order, added)
+        scene, chosen, notes = load(mi, order, added)
     except Refused as error:
         return answer('refused', str(error))
     answer('loaded', dict(renderer=f'Mitsuba {mi.__version__}, {order["variant"]}', time=clock.time(),
                           notes=notes))
-    sensor, integrator = scene.sensors()[0], scene.integrator()
+    sensor, integrator = scene.sensors()[chosen], scene.integrator()
     film, spp = sensor.film(), sensor.sampler().sample_count()
     for line in sys.stdin:
         seed = int(line)
         clock = Clock()
-        integrator.render(scene, sensor=0, seed=seed, develop=False)
+        integrator.render(scene, sensor=chosen, seed=seed, develop=False)
         bitmap = film.bitmap()
         taken = clock.time()
         path = str(Path(order['folder']) / f'mitsuba-{seed}.exr')
-        bitmap.write(path)
+        write(bitmap, path)
         answer('rendered', dict(image=path, spp=spp, time=taken))
 
 

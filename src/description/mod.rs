@@ -161,6 +161,8 @@ pub struct Property {
     pub location: Location,
     /// The folders that a file named by it is looked for in.
     scope: u32,
+    /// Of a transform that a `<lookat>` made: the point that it looks at.
+    target: Option<DVec3>,
 }
 
 impl Property {
@@ -170,6 +172,7 @@ impl Property {
             value,
             location,
             scope,
+            target: None,
         }
     }
 }

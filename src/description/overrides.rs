@@ -1,7 +1,7 @@
 //! Changes to a description before anything is built from it: how the command line's options reach the
 //! scene, on the same validated way as the file's own values.
 
-use std::path::Path;
+use glam::DVec3;
 
 use super::{Description, Kind, Node, NodeId, Property, Value};
 use crate::error::Location;
@@ -11,14 +11,14 @@ impl Description {
     pub fn set(&mut self, id: NodeId, name: &str, value: Value) {
         let properties = &mut self.nodes[id.index()].properties;
         properties.retain(|p| p.name != name);
-        properties.push(Property::new(name, value, command_line(), 0));
+        properties.push(Property::new(name, value, Location::command_line(), 0));
     }
 
     /// Makes a node another plugin of its kind, which keeps those of the old one's properties that it `knows`.
     pub fn replace(&mut self, id: NodeId, plugin: &str, knows: impl Fn(&Property) -> bool) {
         let node = &mut self.nodes[id.index()];
         plugin.clone_into(&mut node.plugin);
-        node.location = command_line();
+        node.location = Location::command_line();
         node.properties.retain(knows);
     }
 
@@ -39,20 +39,22 @@ impl Description {
         property.map(|p| &p.value)
     }
 
+    /// The point that a node's transform looks at, where a `<lookat>` says so.
+    pub fn target(&self, id: NodeId, name: &str) -> Option<DVec3> {
+        let properties = &self.nodes[id.index()].properties;
+        properties.iter().find(|p| p.name == name)?.target
+    }
+
     /// The first nested plugin of a kind, which is added as `plugin` where there is none.
     pub fn child_or_new(&mut self, parent: NodeId, kind: Kind, plugin: &str) -> NodeId {
         if let Some(child) = self.children_of(parent, kind).first() {
             return *child;
         }
         let id = NodeId(self.nodes.len() as u32);
-        self.nodes.push(Node::new(kind, plugin, command_line()));
-        let property = Property::new("", Value::Object(id), command_line(), 0);
+        self.nodes
+            .push(Node::new(kind, plugin, Location::command_line()));
+        let property = Property::new("", Value::Object(id), Location::command_line(), 0);
         self.nodes[parent.index()].properties.push(property);
         id
     }
-}
-
-/// Where the values come from.
-fn command_line() -> Location {
-    Location::of_file(Path::new("command line"))
 }

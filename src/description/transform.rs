@@ -21,6 +21,8 @@ pub(super) struct Reading<'r, 'f> {
     pub(super) defines: &'r mut Defines,
     pub(super) strict: bool,
     pub(super) warnings: Vec<Error>,
+    /// Where the last `<lookat>` looks, in the space that the transform leads to.
+    pub(super) target: Option<DVec3>,
 }
 
 impl Reading<'_, '_> {
@@ -29,7 +31,12 @@ impl Reading<'_, '_> {
         let mut product = DMat4::IDENTITY;
         for child in element.children() {
             let child = Element::open(child, &self.file.lines, self.defines)?;
-            product = self.operation(&child)? * product;
+            let operation = self.operation(&child)?;
+            product = operation * product;
+            self.target = match child.tag {
+                "lookat" | "lookAt" => Some(target(&child)?),
+                _ => self.target.map(|point| operation.transform_point3(point)),
+            };
             child.no_children(&self.file.lines)?;
         }
         if !product.is_finite() {
@@ -140,6 +147,12 @@ fn matrix(element: &Element<'_>) -> Result<DMat4> {
     )))
 }
 
+/// Where a `<lookat>` looks.
+fn target(element: &Element<'_>) -> Result<DVec3> {
+    vector(element.required("target")?, false)
+        .map_err(|e: Error| e.at(element.attribute_location("target")))
+}
+
 fn look_at(element: &Element<'_>) -> Result<DMat4> {
     /// Sine of the angle between `up` and the direction below which the two count as parallel.
     const PARALLEL: f64 = 1e-10;
@@ -148,7 +161,7 @@ fn look_at(element: &Element<'_>) -> Result<DMat4> {
         vector(text, false).map_err(|e: Error| e.at(element.attribute_location(name)))
     };
     let origin = point("origin", element.required("origin")?)?;
-    let target = point("target", element.required("target")?)?;
+    let target = target(element)?;
     let direction = (target - origin)
         .try_normalize()
         .ok_or_else(|| element.error("<lookat> looks nowhere: origin and target coincide"))?;

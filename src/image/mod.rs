@@ -22,6 +22,7 @@ pub use buffer::Image;
 pub use codes::{Codes, Layout, write_codes};
 pub use format::Format;
 pub use metadata::{MetaValue, Metadata, Window};
+pub use openexr::check_channels;
 pub use view::View;
 
 use crate::error::{Error, Location, Problem, Result};

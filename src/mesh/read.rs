@@ -2,7 +2,7 @@
 //! them. A format is one file with a function from [`Input`] to [`Mesh`], and one row in [`FORMATS`]. A file
 //! of any format may be compressed by gzip (`mesh.ply.gz`).
 
-use std::fs::File;
+use std::fs::{self, File};
 use std::io::{self, BufReader, Read, Seek};
 use std::path::{Path, PathBuf};
 
@@ -13,6 +13,7 @@ use super::far::Far;
 use super::polygon::Polygons;
 use super::{Mesh, Repairs, gltf, obj, ply, serialized, stl};
 use crate::error::{Error, Location, Problem, Result};
+use crate::file;
 
 /// How to read a mesh file; the default is what Mitsuba does without properties.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -182,7 +183,7 @@ pub(super) fn with_input<T>(path: &Path, work: impl FnOnce(Input<'_>) -> Result<
 
 /// What is in a mesh file, inflated where it is compressed.
 pub(crate) fn contents(path: &Path) -> io::Result<Box<dyn Read>> {
-    let file = File::open(path)?;
+    let file = file::open(path)?;
     if is_compressed(path) {
         Ok(Box::new(inflate(file)))
     } else {
@@ -220,23 +221,21 @@ pub(super) struct Opened {
 
 /// Opens `path`, which must be a regular file: others may never end.
 pub(super) fn open(path: &Path) -> Result<Opened> {
-    let file = File::open(path).map_err(|e| Error::system("open", path, &e))?;
-    let about = file
-        .metadata()
-        .map_err(|e| Error::system("read", path, &e))?;
-    if about.is_file() {
-        return Ok(Opened {
-            file,
-            length: about.len(),
-        });
+    let refused = |e| Error::system("open", path, &e);
+    let about = fs::metadata(path).map_err(refused)?;
+    if !about.is_file() {
+        let what = if about.is_dir() {
+            "a folder"
+        } else {
+            "no regular file"
+        };
+        let message = format!("a mesh file is wanted here, and this is {what}");
+        return Err(Error::input(message).at(&Location::of_file(path)));
     }
-    let what = if about.is_dir() {
-        "a folder"
-    } else {
-        "no regular file"
-    };
-    let message = format!("a mesh file is wanted here, and this is {what}");
-    Err(Error::input(message).at(&Location::of_file(path)))
+    Ok(Opened {
+        file: file::open(path).map_err(refused)?,
+        length: about.len(),
+    })
 }
 
 fn format_of(path: &Path) -> Result<&'static Format> {

@@ -12,7 +12,7 @@ use super::sweep::{Extent, Setting, Sweep};
 use super::{FORMAT, Fit, Growth, Point, Profile, Series, scaling, verdict};
 use crate::accel::Build;
 use crate::error::{Error, Result};
-use crate::render::{Colors, Options, Report, Seconds, Session, Silent};
+use crate::render::{Colors, Options, Overrides, Report, Seconds, Session, Silent};
 
 /// What to profile, and how.
 #[derive(Clone, Debug)]
@@ -27,6 +27,10 @@ pub struct Settings {
     pub threads: NonZeroUsize,
     /// Rounds over all renders; as many as the effort's time allows where absent.
     pub rounds: Option<usize>,
+    /// Values in place of the subject's own, where a sweep has none.
+    pub overrides: Overrides,
+    /// Which of a scene's sensors, by id or number; the first where absent.
+    pub sensor: Option<String>,
     /// The most bytes that a render may take.
     pub memory_limit: Option<u64>,
 }
@@ -86,7 +90,7 @@ impl Effort {
 /// Names what is wrong with the subject, and a lack of memory.
 pub fn run(settings: &Settings, watch: &dyn Watch) -> Result<Option<Profile>> {
     let begin = Instant::now();
-    let mut stage = Stage::new(&settings.subject, settings.memory_limit)?;
+    let mut stage = Stage::new(settings)?;
     let mut notes = Vec::new();
     let extent = Extent {
         axes: settings.axes.clone(),
@@ -95,11 +99,15 @@ pub fn run(settings: &Settings, watch: &dyn Watch) -> Result<Option<Profile>> {
         own: stage.own_triangles(),
         most: most_triangles(settings, &mut notes),
     };
-    let sweeps = if stage.is_scalable() {
+    let mut sweeps = if stage.is_scalable() {
         extent.sweeps()
     } else {
         extent.sweeps_of_scene()
     };
+    if !stage.has_depth() && settings.axes.contains(&Axis::Depth) {
+        sweeps.retain(|sweep| sweep.axis != Axis::Depth);
+        notes.push("depth is left out: the scene's integrator has no max_depth".to_owned());
+    }
     if settings.axes.contains(&Axis::Objects) && !stage.is_scalable() {
         notes.push(
             "O is left out: a scene has the triangles that it has; profile its mesh".to_owned(),
@@ -302,6 +310,7 @@ impl Rounds<'_> {
             // The same for all, whatever the rays that are to come.
             build: Some(Build::Medium),
             memory_limit: self.settings.memory_limit,
+            sensor: self.stage.sensor(),
             ..Options::default()
         }
     }

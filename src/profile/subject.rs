@@ -10,12 +10,13 @@ use std::path::{Path, PathBuf};
 use glam::Vec3;
 use tempfile::TempDir;
 
+use super::measure::Settings;
 use super::resize::{ply, resized};
 use super::sweep::{Look, Setting};
 use crate::description::{self, Description};
 use crate::error::{Error, Result};
 use crate::mesh::{Mesh, ReadOptions, read, terrain};
-use crate::render::{Options, Overrides, Session, Silent, UpAxis, is_mesh};
+use crate::render::{Options, Overrides, Session, Silent, UpAxis, find_sensor, is_mesh};
 
 /// What a profile is of.
 #[derive(Clone, Debug)]
@@ -64,6 +65,8 @@ const TERRAIN_SEED: u64 = 1;
 #[derive(Debug)]
 pub(super) struct Stage {
     subject: Source,
+    /// Values in place of the subject's, where a setting has none.
+    overrides: Overrides,
     folder: TempDir,
     /// Meshes in the folder, by number of triangles.
     meshes: HashMap<u32, PathBuf>,
@@ -80,6 +83,10 @@ enum Source {
         path: PathBuf,
         options: description::Options,
         place: Place,
+        /// In file order from 0.
+        sensor: usize,
+        /// Whether the integrator has a `max_depth`.
+        has_depth: bool,
     },
 }
 
@@ -93,7 +100,13 @@ struct Place {
 
 impl Stage {
     /// Reads what has to be read.
-    pub(super) fn new(subject: &Subject, memory_limit: Option<u64>) -> Result<Self> {
+    pub(super) fn new(settings: &Settings) -> Result<Self> {
+        let Settings {
+            subject,
+            overrides,
+            memory_limit,
+            ..
+        } = settings;
         let folder = tempfile::tempdir()
             .map_err(|e| Error::system("make a folder for meshes", &std::env::temp_dir(), &e))?;
         let source = match subject {
@@ -112,12 +125,25 @@ impl Stage {
                 }
             }
             Subject::Scene { path, options } => {
-                let description = Description::read(path, options)?;
+                let mut description = Description::read(path, options)?;
+                let sensor = match &settings.sensor {
+                    Some(name) => find_sensor(&description, name)?,
+                    None => 0,
+                };
+                overrides.apply(&mut description);
                 let run = Options {
-                    memory_limit,
+                    memory_limit: *memory_limit,
+                    sensor,
                     ..Options::default()
                 };
-                let bounds = Session::default().bounds(&description, &run, &Silent)?;
+                let mut session = Session::default();
+                let bounds = session.bounds(&description, &run, &Silent)?;
+                let deep = Overrides {
+                    max_depth: Some(2),
+                    ..Overrides::default()
+                };
+                deep.apply(&mut description);
+                let has_depth = session.bounds(&description, &run, &Silent).is_ok();
                 let (low, high) = if bounds.is_empty() {
                     (Vec3::NEG_ONE, Vec3::ONE)
                 } else {
@@ -131,11 +157,14 @@ impl Stage {
                     path,
                     options: options.clone(),
                     place,
+                    sensor,
+                    has_depth,
                 }
             }
         };
         Ok(Self {
             subject: source,
+            overrides: overrides.clone(),
             folder,
             meshes: HashMap::new(),
         })
@@ -144,6 +173,22 @@ impl Stage {
     /// Whether the number of triangles is ours to choose.
     pub(super) fn is_scalable(&self) -> bool {
         !matches!(self.subject, Source::Scene { .. })
+    }
+
+    /// Which of the scene's sensors is looked through.
+    pub(super) fn sensor(&self) -> usize {
+        match self.subject {
+            Source::Scene { sensor, .. } => sensor,
+            _ => 0,
+        }
+    }
+
+    /// Whether the longest path is ours to choose.
+    pub(super) fn has_depth(&self) -> bool {
+        match self.subject {
+            Source::Scene { has_depth, .. } => has_depth,
+            _ => true,
+        }
     }
 
     /// The most triangles that make sense, if there is an end.
@@ -159,13 +204,20 @@ impl Stage {
         let mut overrides = Overrides {
             size: Some((setting.size[0], setting.size[1])),
             spp: Some(setting.spp),
-            ..Overrides::default()
+            ..self.overrides.clone()
         };
+        if let Some(integrator) = setting.look.integrator() {
+            overrides.integrator = Some(integrator.to_owned());
+        }
+        if let Some(depth) = setting.depth {
+            overrides.max_depth = Some(depth.into());
+        }
         let mut description = match &self.subject {
             Source::Scene {
                 path,
                 options,
                 place,
+                ..
             } => {
                 let mut text = format!(
                     r#"<scene version="3.0.0"><include filename="{}"/>"#,
@@ -173,8 +225,6 @@ impl Stage {
                 );
                 text += &place.lights(setting.lights, place.height(setting.look));
                 text += "</scene>";
-                overrides.integrator = setting.look.integrator().map(str::to_owned);
-                overrides.max_depth = setting.depth.map(i64::from);
                 // The text has a name of its own: a file that includes itself is refused.
                 Description::parse(&text, &path.with_extension("profiled"), options)?
             }

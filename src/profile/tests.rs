@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::*;
 use crate::description;
-use crate::render::UpAxis;
+use crate::render::{Overrides, UpAxis};
 
 struct Patient;
 
@@ -32,6 +32,8 @@ fn settings(axes: &[Axis]) -> Settings {
         effort: Effort::Tiny,
         threads: NonZeroUsize::new(2).unwrap(),
         rounds: Some(2),
+        overrides: Overrides::default(),
+        sensor: None,
         memory_limit: None,
     }
 }

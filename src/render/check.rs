@@ -1,69 +1,36 @@
-//! Everything that is wrong with a scene, found without rendering: meshes and images are loaded, all
-//! sensors, materials and lights are built, and no tree.
+//! Everything that is wrong with a scene, found on the way that a render goes, up to where the tree would be built.
 
 use super::options::Options;
+use super::prepare::Ask;
 use super::progress::Progress;
-use super::session::{Task, start};
-use super::{plugins, prepare};
-use crate::accel::Method;
-use crate::color::ColorModel;
-use crate::description::{Description, Kind};
-use crate::error::{Problem, Problems, Result};
-use crate::scene;
+use super::session::{Measure, Session, Task};
+use crate::description::Description;
+use crate::error::{Problem, Result};
 
-/// Finds everything that is wrong with a scene; what is merely worth knowing is returned.
-///
-/// # Errors
-/// All that would stop a render through any of the scene's sensors.
-pub fn check(
-    description: &Description,
-    options: &Options,
-    progress: &dyn Progress,
-) -> Result<Vec<Problem>> {
-    let task = Check {
-        description,
-        options,
-        progress,
-    };
-    start(options.threads, false)?.install(|| task.run_in(options.colors))
-}
-
-struct Check<'a> {
-    description: &'a Description,
-    options: &'a Options,
-    progress: &'a dyn Progress,
-}
-
-impl Task for Check<'_> {
-    type Output = Vec<Problem>;
-
-    fn run<C: ColorModel>(self, color: C) -> Result<Vec<Problem>> {
-        let description = self.description;
-        let mut problems = Problems::default();
-        problems.take(prepare::sensor(description, self.options));
-        let mut warnings = description.warnings().to_vec();
-        for sensor in description.root().children(Kind::Sensor) {
-            let view = problems.take(prepare::view::<C>(description, sensor.node_id()));
-            warnings.extend(view.into_iter().flat_map(|view| view.warnings));
-        }
-        let limit = self.options.memory_limit;
-        match problems.take(prepare::load(description, None, None, limit, self.progress)) {
-            Some(assets) => {
-                warnings.extend_from_slice(assets.warnings());
-                let scene = scene::build(description, &assets, color, Method::Brute);
-                if let Some(scene) = problems.take(scene) {
-                    warnings.extend_from_slice(scene.warnings());
-                }
-            }
-            None => {
-                problems.take(scene::check_materials(description, color));
-            }
-        }
-        let findings = plugins::examine(description);
-        problems.extend(findings.problems);
-        warnings.extend(findings.notes);
-        problems.finish()?;
-        Ok(warnings)
+impl Session {
+    /// Finds everything that is wrong with a scene, as [`Session::render`] would say it, without rendering: meshes
+    /// and images are loaded, sensors, materials and lights are built, and no tree. What is merely worth knowing is
+    /// returned.
+    ///
+    /// # Errors
+    /// As [`Session::render`].
+    pub fn check(
+        &mut self,
+        description: &Description,
+        options: &Options,
+        progress: &dyn Progress,
+    ) -> Result<Vec<Problem>> {
+        let facts = self.run(options, |shelf| {
+            let ask = Ask {
+                shelf,
+                description,
+                options,
+                progress,
+                traced: false,
+            };
+            Measure(ask).run_in(options.colors)
+        })?;
+        Ok(facts.warnings)
     }
 }
 
@@ -75,6 +42,10 @@ mod tests {
     use crate::description;
     use crate::render::Silent;
 
+    fn messages(problems: &[Problem]) -> Vec<String> {
+        problems.iter().map(|p| p.message.clone()).collect()
+    }
+
     fn check_text(text: &str) -> Vec<String> {
         let text = format!("<scene version='3.0.0'>{text}</scene>");
         let scene = Description::parse(
@@ -83,9 +54,9 @@ mod tests {
             &description::Options::default(),
         )
         .unwrap();
-        match check(&scene, &Options::default(), &Silent) {
+        match Session::default().check(&scene, &Options::default(), &Silent) {
             Ok(_) => Vec::new(),
-            Err(error) => error.problems().iter().map(|p| p.message.clone()).collect(),
+            Err(error) => messages(error.problems()),
         }
     }
 

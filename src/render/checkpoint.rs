@@ -17,6 +17,7 @@ use super::fingerprint::Fingerprint;
 use super::options::Checkpoint;
 use super::sums::{Accumulator, Summed, Tally};
 use crate::error::{Error, Problem, Result};
+use crate::file;
 
 impl Checkpoint {
     /// Removes the file, if there is one: the image is written, and there is nothing left to continue.
@@ -139,8 +140,24 @@ fn beside(path: &Path) -> PathBuf {
 
 fn save(path: &Path, header: &Header, data: &[f64]) -> io::Result<()> {
     let new = beside(path);
+    let saved = save_as(&new, header, data).and_then(|()| fs::rename(&new, path));
+    if saved.is_err() {
+        // It would take the room that the image needs.
+        let _ = fs::remove_file(&new);
+        return saved;
+    }
+    // Some file systems cannot sync a folder; the checkpoint is whole either way.
+    let folder = path.parent().filter(|f| !f.as_os_str().is_empty());
+    if let Ok(folder) = File::open(folder.unwrap_or(Path::new("."))) {
+        folder.sync_all().ok();
+    }
+    Ok(())
+}
+
+fn save_as(new: &Path, header: &Header, data: &[f64]) -> io::Result<()> {
+    fs::create_dir_all(new.parent().unwrap_or(Path::new("")))?;
     let mut out = Hashing {
-        inner: File::create(&new)?,
+        inner: File::create(new)?,
         hasher: Hasher::new(),
     };
     let json = serde_json::to_vec(header)?;
@@ -155,15 +172,7 @@ fn save(path: &Path, header: &Header, data: &[f64]) -> io::Result<()> {
     }
     let hash = out.hasher.finalize();
     out.inner.write_all(hash.as_bytes())?;
-    out.inner.sync_all()?;
-    drop(out);
-    fs::rename(&new, path)?;
-    // Some file systems cannot sync a folder; the checkpoint is whole either way.
-    let folder = path.parent().filter(|f| !f.as_os_str().is_empty());
-    if let Ok(folder) = File::open(folder.unwrap_or(Path::new("."))) {
-        folder.sync_all().ok();
-    }
-    Ok(())
+    out.inner.sync_all()
 }
 
 /// Reads the file into `data`, which has the length that the film asks for.
@@ -172,11 +181,8 @@ fn load(path: &Path, expected: &Fingerprint, data: &mut [f64]) -> Result<Header>
         io::ErrorKind::UnexpectedEof => damaged(path, "it ends too early"),
         _ => Error::system("read", path, &e),
     };
-    let file = File::open(path).map_err(failed)?;
+    let file = file::open(path).map_err(failed)?;
     let about = file.metadata().map_err(failed)?;
-    if !about.is_file() {
-        return Err(damaged(path, "it is no regular file"));
-    }
     let mut input = Hashing {
         inner: io::BufReader::new(file),
         hasher: Hasher::new(),

@@ -77,7 +77,7 @@ impl Session {
                 description,
                 sensor: *id,
             };
-            look.run_in(options.colors)
+            look.run_in(options.colors).ok()
         };
         let bounds = contents.bounds;
         let corners = [bounds.min, bounds.max].map(|corner| corner.to_array());
@@ -95,7 +95,8 @@ impl Session {
             geometry_bytes: contents.bytes[0],
             tree_bytes: contents.bytes[1],
             plugins: plugins(description),
-            sensors: sensors.iter().map(sensor).collect::<Result<_>>()?,
+            // One that cannot be built is among the warnings.
+            sensors: sensors.iter().filter_map(sensor).collect(),
             files: files.into_iter().map(file).collect(),
             warnings: contents.warnings,
         })

@@ -7,6 +7,7 @@ mod progress;
 
 mod adaptive;
 mod bare;
+mod black;
 mod blocks;
 mod check;
 mod checkpoint;
@@ -19,6 +20,7 @@ mod plan;
 mod plugins;
 mod prepare;
 mod samples;
+mod sensors;
 mod session;
 mod sums;
 mod uniform;
@@ -36,7 +38,6 @@ use crate::integrator::Stats;
 
 pub use adaptive::AdaptiveReport;
 pub use bare::{BareMesh, UpAxis, describe_mesh, is_mesh};
-pub use check::check;
 pub use heat::Heat;
 pub use info::{NamedFile, SceneInfo, SensorInfo};
 pub use memory::{check_mesh, human_bytes};
@@ -45,6 +46,7 @@ pub(crate) use pinned::pin;
 pub use plan::Completed;
 pub use plugins::{Listed, plugins};
 pub use progress::{Phase, Progress, Silent};
+pub use sensors::{find_sensor, sensor_names, sensors};
 pub use session::Session;
 
 /// A rendered image and how it came about.

@@ -392,7 +392,7 @@ mod tests {
     #[test]
     fn what_is_declared_is_read_and_what_is_read_is_declared() {
         use crate::description::properties::asked;
-        use crate::render::{self, Silent};
+        use crate::render::{Session, Silent};
         let folder = tempfile::tempdir().unwrap();
         let path = |name: &str| folder.path().join(name);
         std::fs::write(path("m.mtl"), "newmtl a\nKd 0.1 0.2 0.3\n").unwrap();
@@ -444,7 +444,7 @@ mod tests {
                 let scene = Description::parse(&text, &path("s.xml"), &Options::default());
                 let scene = scene.unwrap_or_else(|e| panic!("{text}: {e}"));
                 // Some pairs exclude each other, and no reader of PLY takes an OBJ: what counts is what was asked.
-                let _ = render::check(&scene, &Default::default(), &Silent);
+                let _ = Session::default().check(&scene, &Default::default(), &Silent);
             }
             for row in rows().filter(|row| row.standing != Standing::WithoutEffect) {
                 let name_read = row.name.replace('#', "0");

@@ -6,6 +6,7 @@ use std::any::Any;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
+use super::black;
 use super::fingerprint::{self, Contents, Fingerprint};
 use super::memory::{self, Estimate};
 use super::options::{Colors, Options};
@@ -16,8 +17,8 @@ use super::{Report, Seconds, timed};
 use crate::accel::{Build, CacheUse, Method, Recipe};
 use crate::color::ColorModel;
 use crate::description::{Description, Kind, NodeId, Properties};
-use crate::error::{Error, Problem, Problems, Result};
-use crate::image::{Metadata, Window};
+use crate::error::{self, Error, Location, Problem, Problems, Result};
+use crate::image::{self, Metadata, Window};
 use crate::integrator::{self, Estimator, Footprint, Integrator};
 use crate::mesh::ReadMesh;
 use crate::sampler::Sampler;
@@ -108,6 +109,8 @@ pub(super) struct Job<'k, C: ColorModel> {
     pub(super) facts: &'k Facts,
     pub(super) view: View<C>,
     pub(super) seed: u64,
+    /// Which sensor is looked through, in file order from 0.
+    pub(super) sensor: usize,
     /// What loading and building took, unless that was told before.
     pub(super) spent: Seconds,
     pub(super) warnings: Vec<Problem>,
@@ -128,7 +131,12 @@ pub(super) fn sensor(description: &Description, options: &Options) -> Result<Nod
             ),
         };
         let error = Error::input(message).at(root.location());
-        error.help("add a <sensor> to see it through")
+        match sensors.len() {
+            0 => {
+                error.help("add a <sensor type=\"perspective\"> with a to_world to see it through")
+            }
+            _ => error,
+        }
     })
 }
 
@@ -152,10 +160,7 @@ pub(super) fn view<C: ColorModel>(description: &Description, sensor: NodeId) -> 
             }
             sampler
         }
-        None => {
-            problems.push(properties.error("", "the sensor has no sampler"));
-            None
-        }
+        None => Some(Sampler::default()),
     };
     let (integrator, integrator_name) = match description.root().child(Kind::Integrator)? {
         Some(child) => {
@@ -187,9 +192,34 @@ pub(super) fn view<C: ColorModel>(description: &Description, sensor: NodeId) -> 
     })
 }
 
+/// What is wrong with the sensors that are not `chosen`: all of a scene is checked, whoever looks at it. What Étendue
+/// lacks there, and what the command line's values do to them, is nobody's concern but theirs who look through them.
+fn others<C: ColorModel>(description: &Description, chosen: NodeId) -> Result<Vec<Problem>> {
+    let mut problems = Problems::default();
+    let mut warnings = Vec::new();
+    let sensors = description.root().children(Kind::Sensor);
+    for sensor in sensors.iter().filter(|s| s.node_id() != chosen) {
+        let Err(error) = view::<C>(description, sensor.node_id()) else {
+            continue;
+        };
+        for problem in error.problems() {
+            match problem.kind {
+                error::Kind::Unsupported => warnings.push(problem.clone()),
+                _ if problem
+                    .location
+                    .as_ref()
+                    .is_some_and(Location::is_command_line) => {}
+                _ => problems.extend(vec![problem.clone()]),
+            }
+        }
+    }
+    problems.finish()?;
+    Ok(warnings)
+}
+
 /// Loads the shapes but for the mesh that is `given`, with the folder `cache` for what takes long, and displaces those
 /// that want it as far as the `limit` on bytes allows.
-pub(super) fn load(
+fn load(
     description: &Description,
     given: Option<ReadMesh>,
     cache: Option<&Path>,
@@ -212,10 +242,24 @@ struct Share {
     rays: u64,
 }
 
-/// What a scene is made from.
-struct Source<'a> {
-    description: &'a Description,
-    given: Option<ReadMesh>,
+/// What is asked of a scene.
+pub(super) struct Ask<'a> {
+    pub(super) shelf: &'a mut Shelf,
+    pub(super) description: &'a Description,
+    pub(super) options: &'a Options,
+    pub(super) progress: &'a dyn Progress,
+    /// Whether rays will be traced; where the scene is merely looked over, no tree is built.
+    pub(super) traced: bool,
+}
+
+impl Ask<'_> {
+    /// How rays find shapes, if there are any.
+    fn method(&self) -> Method {
+        match self.traced {
+            true => self.options.method,
+            false => Method::Brute,
+        }
+    }
 }
 
 /// How many rays a film of so many samples a pixel takes, as a rule: paths of three bounces that each ask
@@ -228,12 +272,17 @@ fn rays(film: &Film, samples: u32) -> u64 {
 
 /// Loads the shapes and builds the scene, having made sure that there is room for it.
 fn make<C: ColorModel>(
-    Source { description, given }: Source<'_>,
-    options: &Options,
+    ask: &Ask<'_>,
+    given: Option<ReadMesh>,
     color: C,
     Share { film, rays }: Share,
-    progress: &dyn Progress,
 ) -> Result<(Scene<C>, Facts, Seconds)> {
+    let Ask {
+        description,
+        options,
+        progress,
+        ..
+    } = *ask;
     let mut seconds = Seconds::default();
     let announced = Estimate {
         film,
@@ -272,7 +321,7 @@ fn make<C: ColorModel>(
         progress.begin(Phase::Build, 1);
         let build = (options.build).unwrap_or_else(|| Build::suited(primitives, rays));
         let recipe = Recipe {
-            method: options.method,
+            method: ask.method(),
             build,
             cache: options.cache.clone(),
         };
@@ -297,24 +346,23 @@ fn make<C: ColorModel>(
 }
 
 /// Builds the job; what is kept is its scene where the description's is equal, else it makes room for the new one.
-pub(super) fn prepare<'k, C: ColorModel>(
-    shelf: &'k mut Shelf,
-    description: &Description,
-    options: &Options,
-    color: C,
-    progress: &dyn Progress,
-) -> Result<Job<'k, C>> {
-    let Shelf { kept, given } = shelf;
-    let given = given.take();
+pub(super) fn prepare<'k, C: ColorModel>(ask: &'k mut Ask<'_>, color: C) -> Result<Job<'k, C>> {
+    let (description, options) = (ask.description, ask.options);
+    let given = ask.shelf.given.take();
     let mut problems = Problems::default();
     let key = Key {
         scene: fingerprint::scene_key(description),
         colors: options.colors,
-        method: options.method,
+        method: ask.method(),
         build: options.build,
     };
     let sensor = problems.take(sensor(description, options));
     let view = sensor.and_then(|sensor| problems.take(view::<C>(description, sensor)));
+    let view = view.filter(|view| {
+        let names = channels(&color, &view.integrator);
+        let fit = image::check_channels(&names).map_err(|error| integrator_at(description, error));
+        problems.take(fit).is_some()
+    });
     let share = view.as_ref().map(|view| Share {
         film: memory::film(
             &view.film,
@@ -326,22 +374,26 @@ pub(super) fn prepare<'k, C: ColorModel>(
     let share = share.unwrap_or_default();
     let film = share.film;
     let fresh = |kept: &Kept| kept.key == key && kept.stamps == kept.facts.stamps();
-    if !kept.as_ref().is_some_and(fresh) {
-        *kept = None;
-        let source = Source { description, given };
-        let made = make(source, options, color, share, progress);
-        *kept = problems.take(made).map(|(scene, facts, spent)| Kept {
-            key,
-            stamps: facts.stamps(),
-            scene: Box::new(scene),
-            facts,
-            spent,
+    if !ask.shelf.kept.as_ref().is_some_and(fresh) {
+        ask.shelf.kept = None;
+        let others = sensor.map(|sensor| others::<C>(description, sensor));
+        let others = others.and_then(|others| problems.take(others));
+        let made = problems.take(make(ask, given, color, share));
+        ask.shelf.kept = made.map(|(scene, mut facts, spent)| {
+            facts.warnings.extend(others.unwrap_or_default());
+            Kept {
+                key,
+                stamps: facts.stamps(),
+                scene: Box::new(scene),
+                facts,
+                spent,
+            }
         });
     }
     let findings = plugins::examine(description);
     problems.extend(findings.problems);
     problems.finish()?;
-    let (Some(view), Some(kept)) = (view, kept.as_ref()) else {
+    let (Some(view), Some(kept)) = (view, ask.shelf.kept.as_ref()) else {
         unreachable!("a part that is missing is a problem");
     };
     let facts = &kept.facts;
@@ -352,21 +404,32 @@ pub(super) fn prepare<'k, C: ColorModel>(
         trees,
     }
     .check(options.memory_limit)?;
+    let scene: &Scene<C> = kept
+        .scene
+        .downcast_ref()
+        .expect("equal colours have equal types");
     let mut warnings = description.warnings().to_vec();
     warnings.extend(findings.notes);
     warnings.extend(facts.warnings.iter().cloned());
     warnings.extend(view.warnings.iter().cloned());
+    warnings.extend(black::no_light(description, scene.light_count()));
     Ok(Job {
-        scene: kept
-            .scene
-            .downcast_ref()
-            .expect("equal colours have equal types"),
+        scene,
         facts,
         view,
         seed: options.seed,
+        sensor: options.sensor,
         spent: kept.spent,
         warnings,
     })
+}
+
+/// The error, where the integrator stands.
+fn integrator_at(description: &Description, error: Error) -> Error {
+    match description.root().children(Kind::Integrator).first() {
+        Some(integrator) => error.at(integrator.location()),
+        None => error,
+    }
 }
 
 /// The sums' channels: the colours, the integrator's own and, last, opacity.

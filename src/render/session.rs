@@ -7,12 +7,13 @@ use std::num::NonZeroUsize;
 use rayon::ThreadPool;
 
 use super::adaptive::{self, AdaptiveReport};
+use super::black;
 use super::checkpoint::Keeper;
 use super::heat::{self, Heat};
 use super::options::{Adaptive, Colors, Options};
 use super::pinned;
 use super::plan::Completed;
-use super::prepare::{self, Facts, Job, Shelf};
+use super::prepare::{self, Ask, Facts, Job, Shelf};
 use super::progress::Progress;
 use super::sums::{Accumulator, Tally};
 use super::uniform;
@@ -62,30 +63,14 @@ fn bands<const N: usize>(count: usize) -> Result<Bands<N>> {
     Bands::new(count).ok_or_else(|| Error::input(format!("{count} bands; 1 to 32 are possible")))
 }
 
-/// What every task of a session is about.
-struct Ask<'a> {
-    shelf: &'a mut Shelf,
-    description: &'a Description,
-    options: &'a Options,
-    progress: &'a dyn Progress,
-}
-
-impl Ask<'_> {
-    /// Everything that is needed, with the scene in memory.
-    fn job<C: ColorModel>(&mut self, color: C) -> Result<Job<'_, C>> {
-        let (description, options) = (self.description, self.options);
-        prepare::prepare(self.shelf, description, options, color, self.progress)
-    }
-}
-
 /// Makes sure that the scene is in memory and tells of it.
-struct Measure<'a>(Ask<'a>);
+pub(super) struct Measure<'a>(pub(super) Ask<'a>);
 
 impl Task for Measure<'_> {
     type Output = Facts;
 
     fn run<C: ColorModel>(mut self, color: C) -> Result<Facts> {
-        let job = self.0.job(color)?;
+        let job = prepare::prepare(&mut self.0, color)?;
         let mut facts = job.facts.clone();
         facts.warnings = job.warnings;
         Ok(facts)
@@ -99,13 +84,9 @@ impl Task for Render<'_> {
     type Output = Rendered;
 
     fn run<C: ColorModel>(mut self, color: C) -> Result<Rendered> {
-        let Ask {
-            description,
-            options,
-            progress,
-            ..
-        } = self.0;
-        let job = self.0.job(color)?;
+        let (description, options) = (self.0.description, self.0.options);
+        let progress = self.0.progress;
+        let job = prepare::prepare(&mut self.0, color)?;
         let mut keeper = match &options.checkpoint {
             Some(checkpoint) => {
                 let fingerprint = job.fingerprint(description, options)?;
@@ -141,6 +122,9 @@ impl Task for Render<'_> {
             .dropped_pixel
             .map(|pixel| pixel.map(|place| place.saturating_sub(margin)));
         warnings.extend(tally.warning());
+        if completed.units[0] > 0 {
+            warnings.extend(black::black(&job, description, &image));
+        }
         let rendered = Rendered {
             image,
             window: job.window(),
@@ -163,7 +147,7 @@ impl Task for Warm<'_> {
 
     fn run<C: ColorModel>(mut self, color: C) -> Result<Heat> {
         let progress = self.0.progress;
-        heat::count(&self.0.job(color)?, progress)
+        heat::count(&prepare::prepare(&mut self.0, color)?, progress)
     }
 }
 
@@ -250,6 +234,7 @@ impl Session {
                 description,
                 options,
                 progress,
+                traced: true,
             };
             Render(ask).run_in(options.colors)
         })
@@ -271,6 +256,7 @@ impl Session {
                 description,
                 options,
                 progress,
+                traced: true,
             };
             Warm(ask).run_in(options.colors)
         })
@@ -302,13 +288,14 @@ impl Session {
                 description,
                 options,
                 progress,
+                traced: true,
             };
             Measure(ask).run_in(options.colors)
         })
     }
 
     /// Does `work` on the threads that the options ask for.
-    fn run<T: Send>(
+    pub(super) fn run<T: Send>(
         &mut self,
         options: &Options,
         work: impl FnOnce(&mut Shelf) -> Result<T> + Send,
@@ -327,7 +314,7 @@ impl Session {
 }
 
 /// Starts so many threads, one a processor where that is open.
-pub(super) fn start(threads: Option<NonZeroUsize>, pinned: bool) -> Result<ThreadPool> {
+fn start(threads: Option<NonZeroUsize>, pinned: bool) -> Result<ThreadPool> {
     let threads = threads.map_or(0, NonZeroUsize::get);
     let mut builder = rayon::ThreadPoolBuilder::new().num_threads(threads);
     if pinned {

@@ -20,6 +20,11 @@ impl Independent {
         properties: &[super::COMMON],
     };
 
+    /// So many a pixel.
+    pub(super) fn new(count: u32) -> Self {
+        Self { count }
+    }
+
     pub(super) fn build(properties: &Properties<'_>, _context: &()) -> Result<Self> {
         Ok(Self {
             count: sample_count(properties)?,

@@ -88,7 +88,7 @@ impl Sampler {
 const COMMON: &[Row] = &[
     integer(
         "sample_count",
-        4,
+        DEFAULT_COUNT,
         "samples per pixel, which the sampler may round up",
     )
     .between(1.0, MAX_SAMPLES as f64),
@@ -106,6 +106,16 @@ const JITTER: Row = boolean(
     true,
     "points anywhere in their strata, and not at the centres",
 );
+
+impl Default for Sampler {
+    /// Mitsuba's: independent points, 4 per pixel.
+    fn default() -> Self {
+        Self::Independent(independent::Independent::new(DEFAULT_COUNT as u32))
+    }
+}
+
+/// The samples per pixel where a scene does not say.
+const DEFAULT_COUNT: i64 = 4;
 
 /// The most samples a pixel can have.
 pub const MAX_SAMPLES: u32 = 1 << 30;

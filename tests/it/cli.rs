@@ -287,7 +287,7 @@ fn what_is_there_is_skipped_if_that_is_asked_for() {
 fn what_would_stop_an_image_from_being_written_is_said_before_rendering() {
     let place = Place::new();
     for (output, said) in [
-        ("no/such/{name}.png", "folder no/such does not exist"),
+        ("mesh.ply/{name}.png", "mesh.ply is not a folder"),
         ("{nmae}.png", "unknown {nmae}"),
         ("image.tiff", "unknown extension"),
     ] {
@@ -430,4 +430,182 @@ fn relight_lists_layers_weighs_them_and_suggests_names() {
             .stderr()
             .contains("none.exr")
     );
+}
+
+#[test]
+fn folders_of_outputs_are_made() {
+    let place = Place::new();
+    for arguments in [
+        "render scene.xml -o new/a/{name}.exr --checkpoint 0.001 --heatmap heat/{name}.png -q",
+        "mesh convert mesh.ply meshes/copy.ply -q",
+        "mesh generate flake meshes/more/flake.ply --levels 1 -q",
+        "compare new/a/scene.exr new/a/scene.exr --map maps/error.png",
+    ] {
+        place.run(arguments).ends_with(0);
+    }
+    for file in [
+        "new/a/scene.exr",
+        "heat/scene.png",
+        "meshes/copy.ply",
+        "meshes/more/flake.ply",
+        "maps/error.png",
+    ] {
+        assert!(place.path(file).is_file(), "{file}");
+    }
+    // Nothing is made for a scene that cannot be rendered.
+    place.run("render broken.xml -o none/a.exr").ends_with(1);
+    assert!(!place.path("none").exists());
+}
+
+#[test]
+fn a_turntable_goes_around_what_the_camera_looks_at_or_a_pivot() {
+    let place = Place::new();
+    let pixels = |name: &str| {
+        let path = place.path(name);
+        etendue::image::read(&path, &Default::default())
+            .unwrap()
+            .image
+    };
+    let run = |options: &str| {
+        let arguments = format!("render scene.xml --turntable 2 --spp 1 --size 24x16 -q {options}");
+        place.run(&arguments).ends_with(0);
+    };
+    run("-o a{frame}.exr");
+    run("-o b{frame}.exr --pivot 0,0,0");
+    run("-o c{frame}.exr --pivot 0,0,-4");
+    // The target is the origin; where the cube is does not count.
+    assert_eq!(pixels("a1.exr"), pixels("b1.exr"));
+    assert_ne!(pixels("a1.exr"), pixels("c1.exr"));
+    place
+        .run("render scene.xml -o a.exr --pivot 0,0,0")
+        .ends_with(2);
+}
+
+#[test]
+fn numbers_of_the_command_line_have_bounds() {
+    let place = Place::new();
+    for (arguments, said) in [
+        (
+            "render scene.xml -o a.exr --threads 100000",
+            "100000 is not between 1 and",
+        ),
+        ("check scene.xml --threads 0", "0 is not between 1 and"),
+        (
+            "render scene.xml -o a.exr --spp 4000000000",
+            "4000000000 is not in 1..=",
+        ),
+        (
+            "render scene.xml -o a.exr --turntable 2 --pivot 0,inf,0",
+            "write it as X,Y,Z",
+        ),
+        ("profile --threads 100000", "100000 is not between 1 and"),
+        (
+            "crosscheck scene.xml --threads 100000",
+            "100000 is not between 1 and",
+        ),
+    ] {
+        let run = place.run(arguments);
+        let told = run.ends_with(2).stderr();
+        assert!(told.contains(said), "{arguments}: {told}");
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_is_told_by_the_status() {
+    let place = Place::new();
+    place.run("render scene.xml -o a.exr -q").ends_with(0);
+    for arguments in [
+        "render scene.xml -o b.exr --json",
+        "render scene.xml -o b.exr --stats",
+        "check scene.xml --json",
+        "check scene.xml",
+        "info scene.xml --json",
+        "info a.exr mesh.ply",
+        "compare a.exr a.exr --json",
+        "mesh report mesh.ply --json",
+        "mesh convert mesh.ply c.ply --json",
+        "mesh generate flake f.ply --levels 1 --json",
+        "plugins --json",
+    ] {
+        let full = fs::OpenOptions::new()
+            .write(true)
+            .open("/dev/full")
+            .expect("Linux has it");
+        let output = Command::new(env!("CARGO_BIN_EXE_etendue"))
+            .current_dir(place.0.path())
+            .args(arguments.split(' '))
+            .stdout(full)
+            .output()
+            .unwrap();
+        let told = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(3), "{arguments}: {told}");
+        assert!(
+            told.contains("cannot write standard output"),
+            "{arguments}: {told}"
+        );
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn what_is_no_regular_file_is_refused_and_not_waited_for() {
+    let place = Place::new();
+    for name in ["a.ply", "a.xml", "a.exr"] {
+        let made = Command::new("mkfifo").arg(place.path(name)).status();
+        assert!(made.is_ok_and(|status| status.success()), "mkfifo");
+    }
+    for arguments in [
+        "render a.ply -o b.exr",
+        "render a.xml -o b.exr",
+        "check a.ply a.xml",
+        "info a.ply a.exr a.xml",
+        "mesh report a.ply",
+        "mesh convert a.ply b.ply",
+        "compare a.exr a.exr",
+        "profile a.ply --quick",
+    ] {
+        let run = place.run(arguments);
+        assert_ne!(run.status(), 0, "{arguments}");
+        let told = run.stderr();
+        assert!(
+            told.contains("regular file") || told.contains("not a file"),
+            "{arguments}: {told}"
+        );
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_signal_leaves_no_half_of_a_mesh() {
+    let place = Place::new();
+    let temporary = || {
+        let names = fs::read_dir(place.0.path()).unwrap();
+        let mut names = names.map(|e| e.unwrap().file_name().into_string().unwrap());
+        names.any(|name| name.starts_with(".etendue-"))
+    };
+    for signal in ["-INT", "-TERM"] {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_etendue"))
+            .current_dir(place.0.path())
+            .args([
+                "mesh",
+                "generate",
+                "terrain",
+                "big.ply",
+                "--triangles",
+                "2M",
+                "-q",
+            ])
+            .spawn()
+            .unwrap();
+        while !temporary() && child.try_wait().unwrap().is_none() {
+            std::thread::sleep(std::time::Duration::from_micros(200));
+        }
+        let id = child.id().to_string();
+        let _ = Command::new("kill").args([signal, &id]).output();
+        let status = child.wait().unwrap().code();
+        // It may have been done before the signal came.
+        assert!(matches!(status, Some(0 | 130)), "{signal}: {status:?}");
+        assert!(!temporary(), "{signal}");
+    }
 }

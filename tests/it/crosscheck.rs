@@ -3,14 +3,13 @@
 //! that every way in which one can fail is seen; against the real one where there is one.
 
 use std::fs;
-use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use etendue::compare::seeds::{self, Side, Verdict};
 use serde_json::Value;
 
-use super::support::{at, image_of};
+use super::support::{at, image_of, mitsuba};
 
 /// Renders `a` and `b` `count` times each, no two with the same seed, and judges.
 fn judge(a: &str, b: &str, count: u64) -> Verdict {
@@ -210,9 +209,121 @@ mod impostors {
         }
         let told = place.says(2, "dim.xml --python ./no-python");
         assert!(
-            told.contains("no Python ./no-python") && told.contains("tools/venv"),
+            told.contains("no Python ./no-python") && told.contains("--install"),
             "{told}"
         );
+    }
+
+    /// A program that leaves a mark where it runs.
+    fn trap(path: &Path, mark: &Path) {
+        fs::create_dir_all(path.parent().expect("in a folder")).expect("writable");
+        fs::write(
+            path,
+            format!("#!/bin/sh\ntouch '{}'\nexit 1\n", mark.display()),
+        )
+        .expect("writable");
+        fs::set_permissions(path, fs::Permissions::from_mode(0o755)).expect("it is ours");
+    }
+
+    #[test]
+    fn nothing_of_the_current_folder_is_run_unasked() {
+        let place = Place::new();
+        let mark = place.path("mark");
+        for program in [
+            "target/venv/bin/python",
+            "venv/bin/python",
+            "python3",
+            "python",
+        ] {
+            trap(&place.path(program), &mark);
+        }
+        fs::create_dir_all(place.path("tools/mitsuba")).expect("writable");
+        let plugin = format!("open({mark:?}, 'w')\n");
+        for file in [
+            "tools/mitsuba/plugin.py",
+            "mitsuba.py",
+            "json.py",
+            "numpy.py",
+        ] {
+            fs::write(place.path(file), &plugin).expect("writable");
+        }
+        let run = |python: &[&str]| {
+            let mut command = Command::new(env!("CARGO_BIN_EXE_etendue"));
+            let system = std::env::var("PATH").expect("there is a path");
+            command
+                .current_dir(place.0.path())
+                .env_remove(etendue::crosscheck::VARIABLE)
+                .env("HOME", place.path("home"))
+                .env("XDG_CACHE_HOME", "cache")
+                .env("PATH", format!(":.:{system}"))
+                .args([
+                    "crosscheck",
+                    "dim.xml",
+                    "--seeds",
+                    "2",
+                    "--spp",
+                    "1",
+                    "--size",
+                    "8x8",
+                ])
+                .args(["--precision", "99"])
+                .args(python);
+            let output = command.output().expect("the program starts");
+            let text =
+                [output.stdout, output.stderr].map(|b| String::from_utf8_lossy(&b).into_owned());
+            (output.status.code(), text.concat())
+        };
+        let (status, told) = run(&[]);
+        assert_eq!(status, Some(2), "{told}");
+        assert!(
+            told.contains("there is no Python to run Mitsuba with"),
+            "{told}"
+        );
+        assert!(!mark.exists());
+        // One that is installed is found, and named.
+        trap(
+            &place.path("home/.cache/etendue/python/bin/python"),
+            &place.path("ran"),
+        );
+        let (_, told) = run(&[]);
+        assert!(place.path("ran").exists() && !mark.exists(), "{told}");
+        if let Some(python) = mitsuba() {
+            let (status, told) = run(&["--python", &python.display().to_string()]);
+            assert_eq!(status, Some(0), "{told}");
+            assert!(told.contains("(--python)"), "{told}");
+            assert!(!mark.exists(), "{told}");
+        }
+    }
+
+    #[test]
+    fn the_environment_is_made_where_caches_are() {
+        let place = Place::new();
+        let script = r#"#!/bin/sh
+echo "$@" >>"$HOME/log"
+case "$*" in
+*venv*) for last; do :; done; mkdir -p "$last/bin"; cp "$0" "$last/bin/python";;
+esac
+"#;
+        place.python(script);
+        let run = || {
+            let mut command = Command::new(env!("CARGO_BIN_EXE_etendue"));
+            command
+                .current_dir(place.0.path())
+                .env("HOME", place.0.path())
+                .env_remove("XDG_CACHE_HOME")
+                .args(["crosscheck", "--install", "--python", "./python"]);
+            command.output().expect("the program starts")
+        };
+        let output = run();
+        let told = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert_eq!(output.status.code(), Some(0), "{told}");
+        assert!(told.contains(".cache/etendue/python/bin/python"), "{told}");
+        let log = fs::read_to_string(place.path("log")).expect("it was run");
+        assert!(
+            log.contains("-m venv") && log.contains("pip install"),
+            "{log}"
+        );
+        assert!(log.contains("mitsuba=="), "{log}");
     }
 
     #[test]
@@ -254,23 +365,6 @@ mod impostors {
         assert_eq!(child.wait().expect("it ends").code(), Some(130));
         assert!(!signal(&pid, "-0"), "{pid} is still there");
     }
-}
-
-/// The Python that has Mitsuba, or a line past the capture of the test's output that there is none.
-fn mitsuba() -> Option<PathBuf> {
-    let python = etendue::crosscheck::find_python(None, env!("CARGO_BIN_EXE_etendue").as_ref());
-    let works = |python: &PathBuf| {
-        let run = Command::new(python).args(["-c", "import mitsuba"]).output();
-        run.is_ok_and(|output| output.status.success())
-    };
-    let found = python.ok().filter(works);
-    if found.is_none() {
-        let _ = writeln!(
-            std::io::stderr(),
-            "SKIPPED: no Python has Mitsuba; tools/venv makes one"
-        );
-    }
-    found
 }
 
 #[test]

@@ -1,7 +1,9 @@
 //! What the tests have in common: rendering a scene that stands in a string, and the mean of an image with
 //! its standard error.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use etendue::description::{self, Description};
 use etendue::image::Image;
@@ -10,6 +12,27 @@ use etendue::render::{Options, Overrides, Rendered, Silent, render};
 /// A file or folder of the checkout.
 pub(crate) fn at(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
+}
+
+/// The Python that has Mitsuba, or a line past the capture of the test's output that there is none.
+pub(crate) fn mitsuba() -> Option<PathBuf> {
+    // That of ETENDUE_PYTHON, or the one that tools/venv makes in the target directory.
+    let environment = Path::new(env!("CARGO_BIN_EXE_etendue")).ancestors().nth(2);
+    let environment = environment.map(|target| target.join("venv/bin/python"));
+    let named = std::env::var_os(etendue::crosscheck::VARIABLE).map(PathBuf::from);
+    let python = named.or(environment);
+    let works = |python: &PathBuf| {
+        let run = Command::new(python).args(["-c", "import mitsuba"]).output();
+        run.is_ok_and(|output| output.status.success())
+    };
+    let found = python.filter(works);
+    if found.is_none() {
+        let _ = writeln!(
+            std::io::stderr(),
+            "SKIPPED: no Python has Mitsuba; tools/venv makes one"
+        );
+    }
+    found
 }
 
 /// Reads a scene from `text`, whose relative paths start at the checkout.

@@ -7,6 +7,7 @@ use etendue::error::{Error, Location, Result};
 use etendue::mesh::{self, Mesh, Parts};
 use serde_json::json;
 
+use super::super::stop::Stop;
 use super::super::{output, report, status};
 
 /// Write a mesh as a binary PLY file
@@ -47,6 +48,7 @@ Exit status: 0 done; 1 the input is wrong; 2 the command line is wrong; 3 the sy
 
 /// Runs the command; the answer is the exit status.
 pub(in crate::cli) fn run(arguments: &Arguments) -> Result<u8> {
+    Stop::without_a_trace(vec![arguments.output.clone()])?;
     check_output(&arguments.output)?;
     let mut read = mesh::read_parts(&arguments.input)?;
     if !arguments.quiet {

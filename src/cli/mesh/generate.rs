@@ -8,6 +8,7 @@ use etendue::mesh::{self, Bumps, Mesh};
 use etendue::render::human_bytes;
 use serde_json::json;
 
+use super::super::stop::Stop;
 use super::super::{memory, output, parse, report, status};
 use super::convert;
 
@@ -123,6 +124,7 @@ Exit status: 0 done; 1 the mesh would be too large, or its base is wrong; 2 the 
 
 /// Runs the command; the answer is the exit status.
 pub(in crate::cli) fn run(arguments: &Arguments) -> Result<u8> {
+    Stop::without_a_trace(vec![arguments.kind.output().to_owned()])?;
     let Kind::Flake { output, levels, .. } = &arguments.kind else {
         return write(arguments);
     };
@@ -267,8 +269,7 @@ impl Arguments {
     }
 
     fn limit(&self) -> Option<u64> {
-        self.memory_limit
-            .or_else(|| memory::available().map(|free| free / 10 * 9))
+        memory::limit(self.memory_limit)
     }
 
     /// Refuses what takes more memory than is allowed, at so many bytes a triangle.

@@ -365,11 +365,13 @@ impl<'o> Reader<'o> {
             defines: &mut self.defines,
             strict: self.options.strict,
             warnings: Vec::new(),
+            target: None,
         };
         let value = match element.tag {
             "animation" => Value::Animation(reading.animation(element)?),
             _ => Value::Transform(reading.transform(element)?),
         };
+        let target = reading.target;
         for warning in reading.warnings {
             self.warn(warning);
         }
@@ -381,6 +383,9 @@ impl<'o> Reader<'o> {
             self.warn(warning.help("Mitsuba renders a flattened mesh black where it has normals"));
         }
         self.property(file, parent, name, value, &element.location);
+        if let Some(property) = self.nodes[parent.index()].properties.last_mut() {
+            property.target = target;
+        }
         Ok(())
     }
 

@@ -9,6 +9,7 @@ mod sampling;
 mod write;
 
 pub(super) use read::{MAGIC, decode};
+pub use write::check_channels;
 pub(super) use write::encode;
 
 /// Our name for a transform, and the standard attribute's.

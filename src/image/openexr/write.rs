@@ -93,19 +93,25 @@ fn check_window(image: &Image, window: &Window) -> Result<()> {
     Ok(())
 }
 
+/// Refuses channels that a file cannot hold side by side.
+///
+/// # Errors
+/// Where two have one name, or a name is empty, too long or holds a zero.
+pub fn check_channels(names: &[String]) -> Result<()> {
+    for (i, name) in names.iter().enumerate() {
+        text_name("channel", name)?;
+        if names[..i].contains(name) {
+            return Err(Error::input(format!("two channels are named {name:?}")));
+        }
+    }
+    Ok(())
+}
+
 fn header(image: &Image, window: &Window, order: &[usize], metadata: &Metadata) -> Result<Header> {
+    check_channels(image.channels())?;
     let mut channels = SmallVec::new();
     for &c in order {
-        let name = text_name("channel", &image.channels()[c])?;
-        if channels
-            .last()
-            .is_some_and(|last: &ChannelDescription| last.name == name)
-        {
-            return Err(Error::input(format!(
-                "two channels are named {:?}",
-                image.channels()[c]
-            )));
-        }
+        let name = utf8(&image.channels()[c]);
         // Lossy codes would treat opacity apart from light; ZIP loses nothing, so all are alike.
         channels.push(ChannelDescription::new(name, SampleType::F32, false));
     }

@@ -201,13 +201,9 @@ fn beside(uri: &str, path: &Path) -> OrWhy<PathBuf> {
 
 fn read_file(file: &Path) -> OrWhy<Vec<u8>> {
     let read = || {
-        // Asked before it is opened, for opening a pipe may wait for ever.
-        let about = std::fs::metadata(file)?;
-        if !about.is_file() {
-            return Err(std::io::Error::other("no regular file"));
-        }
+        let opened = crate::file::open(file)?;
+        let about = opened.metadata()?;
         let mut bytes = Vec::new();
-        let opened = std::fs::File::open(file)?;
         opened.take(about.len()).read_to_end(&mut bytes)?;
         Ok(bytes)
     };

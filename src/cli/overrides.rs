@@ -1,0 +1,139 @@
+//! What is said in place of the scene: one set of options for all commands that read scenes, so that the same
+//! words mean the same scene to each.
+
+use clap::Args;
+use etendue::description::Description;
+use etendue::error::{Error, Result};
+use etendue::render::{self, Colors, Overrides};
+use etendue::sensor::Window;
+
+use super::parse;
+
+pub(super) const IMAGE: &str = "The image";
+
+/// Values in place of the scene's.
+#[derive(Args, Clone, Debug)]
+pub(super) struct ImageArguments {
+    /// Samples a pixel, in place of the scene's sample_count; the sampler may round up
+    #[arg(long, value_name = "N", value_parser = parse::spp(), help_heading = IMAGE)]
+    pub(super) spp: Option<u32>,
+    /// Size of the film in pixels
+    #[arg(long, value_name = "WxH", value_parser = parse::size, help_heading = IMAGE)]
+    size: Option<(u32, u32)>,
+    /// Render only this part of the film; equals the same pixels of the full image
+    #[arg(long, value_name = "X,Y,W,H", value_parser = parse::crop, help_heading = IMAGE)]
+    crop: Option<Window>,
+    /// Render N spectral bands over 360-830 nm instead of RGB; the image's RGB is made from them
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=32), help_heading = IMAGE)]
+    pub(super) bands: Option<u8>,
+    #[command(flatten)]
+    method: MethodArguments,
+}
+
+/// Those of them that mean something where size, samples and bands are what is measured.
+#[derive(Args, Clone, Debug)]
+pub(super) struct MethodArguments {
+    /// Integrator, in place of the scene's
+    #[arg(long, value_name = "NAME", help_heading = IMAGE)]
+    integrator: Option<String>,
+    /// The integrator's max_depth: 1 is emission only, 2 direct light, -1 no limit
+    #[arg(long, value_name = "N", allow_negative_numbers = true, help_heading = IMAGE)]
+    max_depth: Option<i64>,
+    /// Sampler, in place of the scene's
+    #[arg(long, value_name = "NAME", help_heading = IMAGE)]
+    sampler: Option<String>,
+    /// Look through this sensor: its number from 0, or its id; "all" is one image each, where images are made or
+    /// checked one by one
+    #[arg(long, value_name = "N|ID|all", value_parser = |text: &str| Ok::<_, String>(Sensors::from(text)), help_heading = IMAGE)]
+    sensor: Option<Sensors>,
+}
+
+impl ImageArguments {
+    /// What is written into a description.
+    pub(super) fn overrides(&self) -> Overrides {
+        Overrides {
+            spp: self.spp,
+            size: self.size,
+            crop: self.crop,
+            ..self.method.overrides()
+        }
+    }
+
+    /// RGB or bands.
+    pub(super) fn colors(&self) -> Colors {
+        self.bands.map_or(Colors::Rgb, |n| Colors::Bands(n.into()))
+    }
+
+    /// Which sensors are meant, if that is said.
+    pub(super) fn sensors(&self) -> Option<&Sensors> {
+        self.method.sensor.as_ref()
+    }
+
+    /// The one sensor that is meant, if that is said: its number or id.
+    pub(super) fn sensor(&self) -> Result<Option<String>> {
+        self.method.sensor()
+    }
+}
+
+impl MethodArguments {
+    /// What is written into a description.
+    pub(super) fn overrides(&self) -> Overrides {
+        Overrides {
+            sampler: self.sampler.clone(),
+            integrator: self.integrator.clone(),
+            max_depth: self.max_depth,
+            ..Overrides::default()
+        }
+    }
+
+    /// The one sensor that is meant, if that is said: its number or id.
+    pub(super) fn sensor(&self) -> Result<Option<String>> {
+        match &self.sensor {
+            None => Ok(None),
+            Some(Sensors::One(one)) => Ok(Some(one.clone())),
+            Some(Sensors::All) => Err(Error::input("one sensor at a time is looked through here")
+                .help("name it by its number or id")),
+        }
+    }
+}
+
+/// Which sensors of each scene.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Sensors {
+    All,
+    /// A number from 0, or an id.
+    One(String),
+}
+
+impl From<&str> for Sensors {
+    fn from(text: &str) -> Self {
+        match text {
+            "all" => Self::All,
+            one => Self::One(one.to_owned()),
+        }
+    }
+}
+
+/// A sensor of a scene.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Chosen {
+    /// In file order from 0.
+    pub(super) number: usize,
+    /// Its id, or its number where it has none.
+    pub(super) name: String,
+}
+
+/// The sensors that are meant, the first where nothing is said. That a scene has none is told by whoever looks
+/// through it.
+pub(super) fn chosen(description: &Description, wanted: Option<&Sensors>) -> Result<Vec<Chosen>> {
+    let names = render::sensor_names(description);
+    let sensor = |number: usize| Chosen {
+        number,
+        name: names.get(number).cloned().unwrap_or_default(),
+    };
+    Ok(match wanted {
+        Some(Sensors::All) if !names.is_empty() => (0..names.len()).map(sensor).collect(),
+        Some(Sensors::One(one)) => vec![sensor(render::find_sensor(description, one)?)],
+        _ => vec![sensor(0)],
+    })
+}
