@@ -200,7 +200,7 @@ fn beside(uri: &str, path: &Path) -> OrWhy<PathBuf> {
 }
 
 fn read_file(file: &Path) -> OrWhy<Vec<u8>> {
-    let read = || {
+    let read = || -> std::io::Result<Vec<u8>> {
         let opened = crate::file::open(file)?;
         let about = opened.metadata()?;
         let mut bytes = Vec::new();
