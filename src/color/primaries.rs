@@ -46,7 +46,7 @@ impl Primaries {
     }
 
     /// What takes this RGB to XYZ; `None` where three such primaries make no space of colours.
-    fn to_xyz(&self) -> Option<DMat3> {
+    fn to_xyz(self) -> Option<DMat3> {
         // Of no luminance yet: the sums X + Y + Z are 1.
         let column = |[x, y]: [f64; 2]| DVec3::new(x, y, 1.0 - x - y);
         let shape = DMat3::from_cols(column(self.red), column(self.green), column(self.blue));

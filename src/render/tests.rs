@@ -293,8 +293,9 @@ fn the_time_to_load_is_told_by_the_render_that_first_made_use_of_it() {
 fn a_checkpoint_that_cannot_be_written_is_a_warning() {
     let place = Place::new();
     let mut options = place.keeping();
-    let missing = place.path("no/such/folder");
-    options.checkpoint.as_mut().unwrap().path = missing;
+    let file = place.path("file");
+    std::fs::write(&file, "").unwrap();
+    options.checkpoint.as_mut().unwrap().path = file.join("in it");
     let rendered = render(&place.scene(SCENE), &options, &Silent).unwrap();
     assert!(rendered.report.completed.is_whole());
     let said = rendered.warnings[0].to_string();

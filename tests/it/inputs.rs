@@ -102,11 +102,6 @@ const CASES: &[Case<'static>] = &[
         &["\"constant\" cannot stand on a shape"],
     ),
     wrong(
-        "an area emitter that stands on none",
-        r#"<emitter type="area"/><!--!-->"#,
-        &["area", "shape"],
-    ),
-    wrong(
         "two environments",
         "<emitter type=\"constant\"/>\n<emitter type=\"constant\"/><!--!-->",
         &["environment", "the first"],
@@ -520,12 +515,6 @@ const CASES: &[Case<'static>] = &[
         &[".exr, .hdr or .png"],
     ),
     usage("no extension", "-o image", 1, &[".exr, .hdr or .png"]),
-    usage(
-        "a folder that is not there",
-        "-o nowhere/image.png",
-        1,
-        &["nowhere"],
-    ),
     usage(
         "an input that is not there",
         "nowhere.xml -o {name}.png",

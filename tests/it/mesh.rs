@@ -151,11 +151,6 @@ fn what_cannot_be_done_is_refused_with_a_reason_and_leaves_nothing() {
         ("convert broken.obj out.ply", 1, "vertex 2 is out of range"),
         ("convert missing.obj out.ply", 3, "missing.obj"),
         ("convert broken.obj out.obj", 1, "written as .ply"),
-        (
-            "convert broken.obj none/out.ply",
-            1,
-            "folder none does not exist",
-        ),
         ("report broken.obj missing.stl", 3, "missing.stl"),
         (
             "generate terrain out.ply --triangles 40M --memory-limit 10M",

@@ -107,7 +107,8 @@ impl Sampling {
                     return invalid("zero sampling factor");
                 }
                 let whole = |size: usize, position: i32, step: u32| {
-                    size as u64 % u64::from(step) == 0 && i64::from(position) % i64::from(step) == 0
+                    (size as u64).is_multiple_of(u64::from(step))
+                        && i64::from(position) % i64::from(step) == 0
                 };
                 if !whole(width, x, across) || !whole(height, y, down) {
                     return invalid("the sampling factors do not divide the data window");
@@ -159,7 +160,7 @@ pub(super) fn decompress(chunk: Chunk, header: &Header) -> Result<UncompressedBl
         .map(|(_, c)| area.size.0 / c.sampling.0 * c.sample_type.bytes_per_sample())
         .sum();
     // The crate takes a block to have so many bytes for each of its pixels.
-    if bytes % area.size.area() != 0 {
+    if !bytes.is_multiple_of(area.size.area()) {
         return Err(Error::unsupported("channels of such sampling factors"));
     }
     let mut header = header.clone();
