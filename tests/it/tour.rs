@@ -35,7 +35,8 @@ fn cheap(line: &str) -> String {
     line = replaced(&line, "--levels", "--levels 1");
     line = replaced(&line, "--turntable", "--turntable 2");
     line = line.replace("--quick", "--quick --rounds 1 --sweep samples");
-    if line.contains("etendue render ") && !line.contains("--crop") {
+    let small = line.starts_with("for ") || line.contains("--crop");
+    if line.contains("etendue render ") && !small {
         line = replaced(&line, "--size", "")
             .replace("etendue render ", "etendue render --size 24x16 ");
         if !line.contains("--noise-threshold") {
