@@ -1,11 +1,12 @@
-//! `sphere`: centre, radius and `to_world` (rotation and uniform scale). Texture coordinates are
+//! `sphere`: centre, radius and `to_world` (rotation and uniform scale; one that stretches warns, and scales as its x
+//! axis does). Texture coordinates are
 //! (φ/2π, θ/π) about the local z axis. The quadratic is solved in double precision, so that small and
 //! distant spheres keep their shape. Seen from outside, light samples are uniform over the cone that the
 //! sphere fills (Shirley, Wang and Zimmerman, *Monte Carlo techniques for direct lighting*, 1996).
 
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
-use glam::{DMat4, Mat3, Vec2, Vec3};
+use glam::{DMat4, DVec3, Mat3, Vec2, Vec3};
 
 use super::{
     Bounds, Chart, Geometry, Shape, Surface, SurfaceSample, area_to_solid_angle, to_world,
@@ -44,14 +45,10 @@ pub(super) fn build(properties: &Properties<'_>, outer: &DMat4) -> Result<Shape>
     let center = properties.vector("center")?;
     let radius = properties.float("radius")?;
     let axes = [to_world.x_axis, to_world.y_axis, to_world.z_axis].map(|a| a.truncate());
+    // Mitsuba's radius, whatever the other axes are.
     let scale = axes[0].length();
     let uneven = axes.iter().any(|a| (a.length() / scale - 1.0).abs() > 1e-4)
         || (0..3).any(|i| axes[i].dot(axes[(i + 1) % 3]).abs() > 1e-4 * scale * scale);
-    if uneven {
-        return Err(properties
-            .error("to_world", "a sphere cannot be stretched or sheared")
-            .help("scale all axes alike"));
-    }
     let (center, radius) = (
         to_world.transform_point3(center).as_vec3(),
         (radius * scale) as f32,
@@ -59,7 +56,12 @@ pub(super) fn build(properties: &Properties<'_>, outer: &DMat4) -> Result<Shape>
     if !(radius > 0.0 && radius.is_finite() && center.is_finite()) {
         return Err(properties.error("radius", "a sphere needs a positive, finite radius"));
     }
-    let [x, y, z] = axes.map(|a| (a / scale).as_vec3());
+    let turned = if uneven {
+        right_angled(axes)
+    } else {
+        axes.map(|a| a / scale)
+    };
+    let [x, y, z] = turned.map(|a| a.as_vec3());
     // As in Mitsuba, a mirroring transform turns a sphere's normals over, and no other shape's here.
     let mirrored = axes[0].cross(axes[1]).dot(axes[2]) < 0.0;
     let flip_normals = properties.boolean("flip_normals")? != mirrored;
@@ -69,7 +71,27 @@ pub(super) fn build(properties: &Properties<'_>, outer: &DMat4) -> Result<Shape>
         rotation: Mat3::from_cols(x, y, z),
         flip_normals,
     };
-    Ok(Geometry::Sphere(sphere).into())
+    let mut shape = Shape::from(Geometry::Sphere(sphere));
+    if uneven {
+        let message = format!(
+            "a sphere cannot be stretched or sheared: it stays one, of radius {radius} as along the x axis, as in Mitsuba"
+        );
+        let warning = properties.error("to_world", message);
+        let warning = warning.help("scale all axes alike");
+        shape.warnings.extend_from_slice(warning.problems());
+    }
+    Ok(shape)
+}
+
+/// The nearest that axes of any lengths and angles come to three at right angles: the first stays, and the hands do.
+fn right_angled([x, y, z]: [DVec3; 3]) -> [DVec3; 3] {
+    let x = x.normalize();
+    let across = |a: DVec3| (a - a.dot(x) * x).try_normalize();
+    let y = across(y)
+        .or_else(|| across(z).map(|z| z.cross(x)))
+        .unwrap_or_else(|| x.any_orthonormal_vector());
+    let right = x.cross(y);
+    [x, y, if right.dot(z) < 0.0 { -right } else { right }]
 }
 
 impl Sphere {

@@ -527,3 +527,38 @@ fn flipped_meshes_without_texture_coordinates_have_the_u_and_v_of_unflipped_ones
         }
     }
 }
+
+/// Mitsuba 3.9.1 renders spheres that are stretched along y or z, or sheared, as it does the unit sphere.
+#[test]
+fn a_stretched_sphere_is_one_of_the_radius_along_x_and_warns() {
+    for (transform, radius) in [
+        (r#"<scale x="2"/>"#, 2.0),
+        (r#"<scale y="2"/><rotate z="1" angle="30"/>"#, 1.0),
+        (r#"<scale y="0"/>"#, 1.0),
+        (r#"<scale x="1.5" y="0" z="0"/>"#, 1.5),
+        (r#"<matrix value="1 1 0 0 1 0 0 0 1"/>"#, 1.0),
+    ] {
+        let text = format!(
+            r#"<scene version="3.0.0"><shape type="sphere"><transform name="to_world">{transform}</transform></shape></scene>"#
+        );
+        let scene = Description::parse(&text, Path::new("test.xml"), &Options::default()).unwrap();
+        let shape = build(&scene.root().children(Kind::Shape)[0]).unwrap();
+        assert_eq!(shape.warnings.len(), 1, "{transform}");
+        let area = 4.0 * PI * radius * radius;
+        assert!(
+            (shape.geometry.area() / area - 1.0).abs() < 1e-6,
+            "{transform}"
+        );
+        let eye = ray(Vec3::new(0.1, 0.2, 5.0), Vec3::ZERO);
+        let at = meet(&shape.geometry, &eye).expect("a hit");
+        assert!(
+            (f64::from(at.position.length()) - radius).abs() < 1e-5,
+            "{transform}"
+        );
+        assert!(
+            (at.normal - at.position.normalize()).length() < 1e-5,
+            "{transform}"
+        );
+        assert!(at.dp_du.is_finite() && at.uv.is_finite(), "{transform}");
+    }
+}
