@@ -147,11 +147,8 @@ pub(super) fn examine(description: &Description) -> Findings {
             {
                 problems.push((id, of_our_own(&node, row, property)));
             }
-            // What is at the top of the scene for others waits for them; an area light is for a shape.
-            let is_area =
-                |child: &Properties<'_>| (child.kind(), child.plugin()) == (Kind::Emitter, "area");
-            let waits = row.standing != Standing::Common || child.as_ref().is_some_and(is_area);
-            let serves = id != root.node_id() || !waits;
+            // What is at the top of the scene for others waits for them.
+            let serves = id != root.node_id() || row.standing == Standing::Common;
             if let Some(child) = child.filter(|_| serves)
                 && met.insert(child.node_id())
             {
