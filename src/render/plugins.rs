@@ -1,7 +1,7 @@
 //! Every plugin that a scene can name, with what it declares; and what a scene says that no plugin declares. This
 //! needs nothing to be built, so that it is told along with everything else that is wrong.
 
-use std::collections::BTreeSet;
+use std::collections::{HashMap, HashSet};
 
 use crate::color::Rgb;
 use crate::description::declared::{
@@ -108,21 +108,18 @@ pub(super) struct Findings {
 /// Holds what a scene says against what its plugins declare. What serves nobody is not looked at, and a plugin
 /// that is not known is for its family to name.
 pub(super) fn examine(description: &Description) -> Findings {
-    let plugins = plugins();
-    let table = |node: &Properties<'_>| -> Option<&'static Plugin> {
-        let named = |kind| {
-            let mut known = plugins.iter();
-            known.find(|p| p.kind == kind && p.name == node.plugin())
-        };
+    let listed = plugins().into_iter().map(|p| ((p.kind, p.name), p.plugin));
+    let tables: HashMap<(Kind, &str), &'static Plugin> = listed.collect();
+    let table = |node: &Properties<'_>| {
         // Either tag serves both.
-        let listed = match node.kind() {
-            Kind::Spectrum => named(Kind::Texture),
-            kind => named(kind),
+        let kind = match node.kind() {
+            Kind::Spectrum => Kind::Texture,
+            kind => kind,
         };
-        Some(listed?.plugin)
+        tables.get(&(kind, node.plugin())).copied()
     };
     let root = description.root();
-    let mut met = BTreeSet::from([root.node_id()]);
+    let mut met = HashSet::from([root.node_id()]);
     let mut waiting = vec![root.node_id()];
     let mut findings = Findings::default();
     let mut problems: Vec<(NodeId, Error)> = Vec::new();
@@ -160,7 +157,7 @@ pub(super) fn examine(description: &Description) -> Findings {
     for (_, error) in problems {
         findings.problems.extend_from_slice(error.problems());
     }
-    findings.notes.extend(idle(&root, &met));
+    findings.notes.extend(idle(description, &met));
     findings
 }
 
@@ -198,11 +195,18 @@ fn of_our_own(node: &Properties<'_>, row: &Row, property: &Property) -> Error {
 }
 
 /// The note that there are plugins at the top of the scene that serve nobody.
-fn idle(root: &Properties<'_>, met: &BTreeSet<NodeId>) -> Option<Problem> {
-    let kinds = Kind::ALL.into_iter().flat_map(|kind| root.children(kind));
-    let mut idle: Vec<Properties<'_>> = kinds.filter(|c| !met.contains(&c.node_id())).collect();
-    idle.sort_by_key(Properties::node_id);
-    let first = idle.first()?;
+fn idle(description: &Description, met: &HashSet<NodeId>) -> Option<Problem> {
+    let root = description.root();
+    let objects = root
+        .all()
+        .iter()
+        .filter_map(|property| match property.value {
+            Value::Object(id) => Some(id),
+            _ => None,
+        });
+    let mut idle: Vec<NodeId> = objects.filter(|id| !met.contains(id)).collect();
+    idle.sort_unstable();
+    let first = description.node(*idle.first()?);
     let what = format!("{} {:?}", first.kind(), first.plugin());
     let message = match idle.len() {
         1 => format!("nothing refers to the {what}"),
@@ -289,7 +293,7 @@ mod tests {
         } in plugins()
         {
             assert!(!plugin.about.is_empty(), "{kind} {name}");
-            let mut names = BTreeSet::new();
+            let mut names = HashSet::new();
             for row in plugin.rows() {
                 let place = format!("{kind} {name}: {} {}", row.name, row.takes);
                 let unnamed = matches!(row.takes, Takes::Nested(_));
