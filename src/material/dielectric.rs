@@ -7,7 +7,7 @@ use glam::{Vec2, Vec3};
 use super::{Bsdf, BsdfSample, Lobes, fresnel, ior};
 use crate::color::{ColorModel, Role};
 use crate::description::Properties;
-use crate::description::declared::{Plugin, texture};
+use crate::description::declared::{Plugin, Row, texture};
 use crate::error::Result;
 use crate::interaction::Interaction;
 use crate::texture::{Palettes, Texture};
@@ -21,28 +21,40 @@ pub struct Dielectric<C: ColorModel> {
     specular_transmittance: Texture<C>,
 }
 
+/// What light is multiplied by at all clear boundaries.
+pub(super) const FACTORS: &[Row] = &[
+    texture("specular_reflectance", 1.0, "factor on what is reflected"),
+    texture(
+        "specular_transmittance",
+        1.0,
+        "factor on what is let through",
+    ),
+];
+
+/// The properties [`FACTORS`].
+pub(super) fn factors<C: ColorModel>(
+    properties: &Properties<'_>,
+    palettes: &Palettes<C>,
+) -> Result<[Texture<C>; 2]> {
+    let factor = |name| palettes.colors.texture(properties, name, Role::Reflectance);
+    Ok([
+        factor("specular_reflectance")?,
+        factor("specular_transmittance")?,
+    ])
+}
+
 impl<C: ColorModel> Dielectric<C> {
     pub(super) const PLUGIN: Plugin = Plugin {
         about: "smooth glass",
-        properties: &[
-            &super::ior::dielectric("bk7"),
-            &[
-                texture("specular_reflectance", 1.0, "factor on what is reflected"),
-                texture(
-                    "specular_transmittance",
-                    1.0,
-                    "factor on what is let through",
-                ),
-            ],
-        ],
+        properties: &[&super::ior::dielectric("bk7"), FACTORS],
     };
 
     pub(super) fn build(properties: &Properties<'_>, palettes: &Palettes<C>) -> Result<Self> {
-        let factor = |name| palettes.colors.texture(properties, name, Role::Reflectance);
+        let [specular_reflectance, specular_transmittance] = factors(properties, palettes)?;
         Ok(Self {
             eta: ior::relative(properties)?,
-            specular_reflectance: factor("specular_reflectance")?,
-            specular_transmittance: factor("specular_transmittance")?,
+            specular_reflectance,
+            specular_transmittance,
         })
     }
 }

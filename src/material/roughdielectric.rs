@@ -5,10 +5,10 @@
 use glam::{Vec2, Vec3};
 
 use super::microfacet::{Distribution, Interface, Roughness};
-use super::{Bsdf, BsdfSample, BsdfValue, Lobes, fresnel, ior};
-use crate::color::{ColorModel, Role};
+use super::{Bsdf, BsdfSample, BsdfValue, Lobes, dielectric, fresnel, ior};
+use crate::color::ColorModel;
 use crate::description::Properties;
-use crate::description::declared::{Plugin, texture};
+use crate::description::declared::Plugin;
 use crate::error::Result;
 use crate::interaction::Interaction;
 use crate::texture::{Palettes, Texture};
@@ -29,24 +29,18 @@ impl<C: ColorModel> RoughDielectric<C> {
         properties: &[
             &super::ior::dielectric("bk7"),
             super::microfacet::STRETCHED,
-            &[
-                texture("specular_reflectance", 1.0, "factor on what is reflected"),
-                texture(
-                    "specular_transmittance",
-                    1.0,
-                    "factor on what is let through",
-                ),
-            ],
+            dielectric::FACTORS,
         ],
     };
 
     pub(super) fn build(properties: &Properties<'_>, palettes: &Palettes<C>) -> Result<Self> {
-        let factor = |name| palettes.colors.texture(properties, name, Role::Reflectance);
+        let [specular_reflectance, specular_transmittance] =
+            dielectric::factors(properties, palettes)?;
         Ok(Self {
             roughness: Roughness::build(properties, &palettes.numbers)?,
             eta: ior::relative_and_different(properties)?,
-            specular_reflectance: factor("specular_reflectance")?,
-            specular_transmittance: factor("specular_transmittance")?,
+            specular_reflectance,
+            specular_transmittance,
         })
     }
 }

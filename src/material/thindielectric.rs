@@ -5,10 +5,10 @@
 
 use glam::{Vec2, Vec3};
 
-use super::{Bsdf, BsdfSample, Lobes, fresnel, ior};
-use crate::color::{ColorModel, Role};
+use super::{Bsdf, BsdfSample, Lobes, dielectric, fresnel, ior};
+use crate::color::ColorModel;
 use crate::description::Properties;
-use crate::description::declared::{Plugin, texture};
+use crate::description::declared::Plugin;
 use crate::error::Result;
 use crate::interaction::Interaction;
 use crate::texture::{Palettes, Texture};
@@ -25,25 +25,16 @@ pub struct ThinDielectric<C: ColorModel> {
 impl<C: ColorModel> ThinDielectric<C> {
     pub(super) const PLUGIN: Plugin = Plugin {
         about: "a thin pane of glass",
-        properties: &[
-            &super::ior::dielectric("bk7"),
-            &[
-                texture("specular_reflectance", 1.0, "factor on what is reflected"),
-                texture(
-                    "specular_transmittance",
-                    1.0,
-                    "factor on what is let through",
-                ),
-            ],
-        ],
+        properties: &[&super::ior::dielectric("bk7"), dielectric::FACTORS],
     };
 
     pub(super) fn build(properties: &Properties<'_>, palettes: &Palettes<C>) -> Result<Self> {
-        let factor = |name| palettes.colors.texture(properties, name, Role::Reflectance);
+        let [specular_reflectance, specular_transmittance] =
+            dielectric::factors(properties, palettes)?;
         Ok(Self {
             eta: ior::relative(properties)?,
-            specular_reflectance: factor("specular_reflectance")?,
-            specular_transmittance: factor("specular_transmittance")?,
+            specular_reflectance,
+            specular_transmittance,
         })
     }
 }
