@@ -312,17 +312,18 @@ impl Series<'_> {
     ) -> Result<Rendered> {
         let sensor = sensors(&description).get(item.sensor).copied();
         let turned = self.arguments.turntable.zip(item.frame).zip(sensor);
-        let mut posed = description.clone();
+        let mut posed = None;
         if let Some(((count, frame), sensor)) = turned {
             let bounds = self.session.bounds(&description, options, bar)?;
             let pivot = self.arguments.pivot;
             let center = pivot.unwrap_or_else(|| turntable::pivot(&description, sensor, &bounds));
             let turns = frame as f64 / f64::from(count);
-            turntable::turn(&mut posed, sensor, center, turns);
+            turntable::turn(posed.insert(description.clone()), sensor, center, turns);
         }
-        let mut rendered = self.session.render(&posed, options, bar);
+        let seen = posed.as_ref().unwrap_or(&description);
+        let mut rendered = self.session.render(seen, options, bar);
         if let (Some(path), Ok(_), false) = (&item.heatmap, &rendered, bar.stop()) {
-            let drawn = self.heatmap(&posed, path, options, bar);
+            let drawn = self.heatmap(seen, path, options, bar);
             rendered = rendered.and_then(|rendered| drawn.map(|()| rendered));
         }
         if is_mesh(&item.input) {
