@@ -4,7 +4,7 @@
 //! them.
 
 use std::collections::HashSet;
-use std::fs::{self, File};
+use std::fs;
 use std::path::{Path, PathBuf};
 
 use blake3::Hasher;
@@ -15,6 +15,7 @@ use super::options::{Colors, Options};
 use super::plan::{PASS, TILE};
 use crate::description::{Canonical, Description, NodeId, Part};
 use crate::error::{Error, Result};
+use crate::file;
 
 /// What an image depends on, part by part.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -168,12 +169,8 @@ fn hash(text: &str) -> String {
 }
 
 fn hash_file(path: &Path) -> std::io::Result<String> {
-    // Asked before it is opened, for opening a pipe may wait for ever.
-    if !fs::metadata(path)?.is_file() {
-        return Err(std::io::Error::other("no regular file"));
-    }
     let mut hasher = Hasher::new();
-    hasher.update_reader(File::open(path)?)?;
+    hasher.update_reader(file::open(path)?)?;
     Ok(hasher.finalize().to_hex().to_string())
 }
 
