@@ -35,7 +35,7 @@ pub enum Role {
 
 impl Role {
     /// The same for values that a fraction's bounds do not hold for.
-    pub(super) fn unbounded(self) -> Self {
+    pub(crate) fn unbounded(self) -> Self {
         match self {
             Self::Reflectance => Self::Quantity,
             other => other,

@@ -1,5 +1,6 @@
 //! `mesh_attribute`: the attribute `name` (`vertex_…` or `face_…`) of the mesh that the texture lies on, times
-//! `scale`: one number or a linear BT.709 triple, interpolated over a triangle or the same on all of it.
+//! `scale`: one number or a linear BT.709 triple, interpolated over a triangle or the same on all of it. A reflectance
+//! may leave [0, 1], as in Mitsuba: it is the mesh's number, whatever it is.
 
 use super::{Palette, Pattern};
 use crate::color::{ColorModel, Role};
@@ -75,8 +76,14 @@ impl<C: ColorModel> Pattern<C> for MeshAttribute<C> {
             value(attribute, mesh, at)
         };
         let rgb = at.mesh.and_then(find).unwrap_or_default();
-        let scaled = rgb.map(|v| if v.is_finite() { v * self.scale } else { 0.0 });
-        C::evaluate_texel(&self.color.texel(scaled, self.role), wavelengths)
+        let rgb = rgb.map(|v| if v.is_finite() { v } else { 0.0 });
+        // As in Mitsuba nothing is clamped but what becomes a spectrum, which is scaled afterwards.
+        let role = if self.color.is_rgb() {
+            self.role.unbounded()
+        } else {
+            self.role
+        };
+        C::evaluate_texel(&self.color.texel(rgb, role), wavelengths) * self.scale
     }
 }
 
@@ -85,6 +92,7 @@ mod tests {
     use glam::{Vec2, Vec3};
 
     use super::*;
+    use crate::color::{Bands, Color, Rgb};
     use crate::math::Frame;
 
     #[test]
@@ -127,5 +135,66 @@ mod tests {
         }
         assert_eq!(of(1, 0), [0.25; 3]);
         assert_eq!(of(1, 1), [0.5; 3]);
+    }
+
+    /// The attribute `numbers` of a rectangle's vertices, as a reflectance.
+    fn reflectance<C: ColorModel>(
+        color: C,
+        numbers: [f32; 3],
+        scale: f32,
+        wavelengths: &C::Wavelengths,
+    ) -> C::Sample {
+        let mut mesh = crate::mesh::rectangle();
+        mesh.attributes = vec![Attribute {
+            name: "vertex_color".to_owned(),
+            channels: 3,
+            per: Per::Vertex,
+            values: numbers.repeat(4),
+        }];
+        let texture = MeshAttribute {
+            name: "vertex_color".to_owned(),
+            scale,
+            color,
+            role: Role::Reflectance,
+        };
+        let at = Interaction {
+            mesh: Some(&mesh),
+            ..Interaction::at_uv(Vec2::splat(0.5))
+        };
+        texture.eval(&at, wavelengths)
+    }
+
+    /// Mitsuba 3.9.1 `scalar_rgb`: the `specular_reflectance` of a `conductor` under a constant sky.
+    #[test]
+    fn a_reflectance_of_rgb_may_be_any_number() {
+        let numbers = [1.0, 0.5, -0.5];
+        for (scale, expected) in [(2.0, [2.0, 1.0, -1.0]), (-1.0, [-1.0, -0.5, 0.5])] {
+            assert_eq!(reflectance(Rgb, numbers, scale, &()).0, expected);
+        }
+    }
+
+    /// Mitsuba 3.9.1 `scalar_spectral`: a `diffuse` of (2, 0.5, 0.2) or (1, 0.5, 0.2) under a constant sky.
+    #[test]
+    fn a_reflectance_becomes_a_spectrum_before_it_is_scaled() {
+        let bands = Bands::<16>::new(16).expect("16 bands fit");
+        let sky = bands
+            .store(&Color::Grey(1.0), Role::Emission)
+            .expect("light");
+        for first in [1.0, 2.0] {
+            let mut mean = [0.0; 3];
+            for i in 0..200_u8 {
+                let wavelengths = bands.wavelengths(|| (f32::from(i) + 0.5) / 200.0);
+                let value = reflectance(bands, [first, 0.5, 0.2], 2.0, &wavelengths)
+                    * Bands::evaluate(&sky, &wavelengths);
+                let mut out = [0.0; 19];
+                bands.develop(&value, &wavelengths, &mut out);
+                for (mean, v) in mean.iter_mut().zip(out) {
+                    *mean += v / 200.0;
+                }
+            }
+            for (ours, expected) in mean.into_iter().zip([2.0049, 1.0011, 0.4026]) {
+                assert!((ours / expected - 1.0).abs() < 0.02, "{mean:?}");
+            }
+        }
     }
 }
