@@ -161,7 +161,12 @@ fn write(path: &Path, text: &str) -> Result<(), Failure> {
 
 /// What was changed about the scene, and a difference that the scene does not have.
 fn notes(sides: &[Runner; 2]) -> Vec<String> {
-    let mut notes: Vec<String> = sides.iter().flat_map(|s| s.notes.clone()).collect();
+    let mut notes = Vec::new();
+    for note in sides.iter().flat_map(|side| &side.notes) {
+        if !notes.contains(note) {
+            notes.push(note.clone());
+        }
+    }
     let [ours, theirs] = [0, 1].map(|i| sides[i].spp);
     if ours != theirs {
         notes.push(format!(

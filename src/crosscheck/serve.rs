@@ -6,7 +6,7 @@ use std::num::NonZeroUsize;
 
 use super::cost::Clock;
 use super::order::{Loaded, Order, Rendered, Reply};
-use crate::description::{self, Description};
+use crate::description::{self, Description, Kind, NodeId, Properties, Value};
 use crate::display;
 use crate::error::{Error, Result};
 use crate::image::Metadata;
@@ -54,6 +54,28 @@ fn told(error: &io::Error) -> Error {
     ))
 }
 
+/// Mitsuba 3.9.1 crashes in scalar variants where `path` looks through emitters and a camera ray meets an instance; its
+/// side does the same as this one (`worker.py`). The notes say so.
+fn show_emitters(description: &mut Description, variant: &str) -> Vec<String> {
+    let hides = |node: &Properties<'_>| {
+        let hidden = description.get(node.node_id(), "hide_emitters");
+        node.plugin() == "path" && hidden == Some(&Value::Boolean(true))
+    };
+    let instances = description
+        .nodes_of(Kind::Shape)
+        .any(|shape| shape.plugin() == "instance");
+    if !instances || !variant.starts_with("scalar") {
+        return Vec::new();
+    }
+    let integrators = description.nodes_of(Kind::Integrator);
+    let hiding: Vec<NodeId> = integrators.filter(hides).map(|i| i.node_id()).collect();
+    for id in &hiding {
+        description.set(*id, "hide_emitters", Value::Boolean(false));
+    }
+    let note = "emitters are shown: Mitsuba crashes where path hides them and there are instances";
+    vec![note.to_owned(); hiding.len().min(1)]
+}
+
 /// A scene in memory.
 struct Scene {
     order: Order,
@@ -76,6 +98,7 @@ impl Scene {
             None => 0,
         };
         order.overrides().apply(&mut description);
+        let notes = show_emitters(&mut description, &order.variant);
         let options = Options {
             threads: order.threads.and_then(|n| NonZeroUsize::new(n as usize)),
             colors: order.bands.map_or(Colors::Rgb, |n| Colors::Bands(n.into())),
@@ -87,7 +110,7 @@ impl Scene {
         let loaded = Loaded {
             renderer: format!("Étendue {}", env!("CARGO_PKG_VERSION")),
             time: clock.time(),
-            notes: Vec::new(),
+            notes,
         };
         let scene = Self {
             order,

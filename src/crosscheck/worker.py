@@ -169,6 +169,18 @@ class Parsed:
             if order['spp'] is not None:
                 self.props(sampler)['sample_count'] = order['spp']
 
+    def show_emitters(self):
+        """Mitsuba 3.9.1 crashes in scalar variants where `path` looks through emitters and a camera ray meets an
+        instance. Étendue's side does the same (`serve.rs`)."""
+        shapes = [self.props(node).plugin_name() for node in self.all('Shape')]
+        if not self.variant.startswith('scalar') or 'instance' not in shapes:
+            return
+        for node in self.all('Integrator'):
+            props = self.props(node)
+            if props.plugin_name() == 'path' and 'hide_emitters' in props and props['hide_emitters']:
+                props['hide_emitters'] = False
+                self.notes.append('emitters are shown: Mitsuba crashes where path hides them and there are instances')
+
     def replace(self, node, plugin):
         """Makes a node another plugin, which keeps of the properties what both read."""
         props, other = self.props(node), self.mi.Properties(plugin)
@@ -212,6 +224,7 @@ def load(mi, order, added):
         parsed = Parsed(mi, order, added)
         sensor = parsed.sensor(order['sensor'])
         parsed.override(order)
+        parsed.show_emitters()
         parsed.disambiguate()
         parsed.replace_samplers()
         parsed.refuse_missing()

@@ -416,6 +416,30 @@ fn mitsuba_agrees_and_what_it_lacks_is_named() {
     );
 }
 
+/// Mitsuba 3.9.1 ends by signal 11 there if nothing is done about it.
+#[test]
+fn where_mitsuba_would_crash_both_sides_show_their_emitters() {
+    let Some(python) = mitsuba() else {
+        return;
+    };
+    let place = Place::new();
+    let depth = r#"<integer name="max_depth" value="3"/>"#;
+    let hidden = format!(r#"{depth}<boolean name="hide_emitters" value="true"/>"#);
+    let group = r#"<shape type="shapegroup" id="g"><shape type="sphere"/></shape>
+        <shape type="instance"><ref id="g"/></shape>"#;
+    let scene = lamp(5.0)
+        .replace(depth, &hidden)
+        .replace(r#"<shape type="sphere"/>"#, group);
+    fs::write(place.path("hidden.xml"), scene).expect("writable");
+    let python = python.display();
+    let told = place.says(
+        0,
+        &format!("hidden.xml --python {python} --spp 32 --size 24x16"),
+    );
+    assert!(told.contains("hidden.xml: agree"), "{told}");
+    assert_eq!(told.matches("emitters are shown").count(), 1, "{told}");
+}
+
 #[test]
 fn plugins_written_in_python_take_part_in_every_variant() {
     let Some(python) = mitsuba() else {
