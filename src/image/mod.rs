@@ -14,6 +14,7 @@ mod radiance;
 mod raster;
 mod view;
 
+use std::cell::Cell;
 use std::fs;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
@@ -111,8 +112,24 @@ fn decode(path: &Path, bytes: &[u8], limits: &Limits) -> Result<Picture> {
     // The checks before it should leave a decoder nothing to panic about. It is other people's code
     // on a stranger's file, though, so a panic that slips through is one more kind of damaged file.
     // Nothing that it could leave half-changed survives it.
-    catch_unwind(AssertUnwindSafe(|| decode_by(decoder, bytes, limits)))
-        .unwrap_or_else(|_| Err(Error::input("the file is damaged")))
+    guarded(|| decode_by(decoder, bytes, limits))
+}
+
+thread_local! {
+    static DECODING: Cell<bool> = const { Cell::new(false) };
+}
+
+/// What `decode` makes; a panic of it is a damaged file, and [`is_decoding`] meanwhile.
+fn guarded(decode: impl FnOnce() -> Result<Picture>) -> Result<Picture> {
+    DECODING.set(true);
+    let picture = catch_unwind(AssertUnwindSafe(decode));
+    DECODING.set(false);
+    picture.unwrap_or_else(|_| Err(Error::input("the file is damaged")))
+}
+
+/// Whether this thread decodes an image: a panic is then told as an error of the file, and needs no words of its own.
+pub fn is_decoding() -> bool {
+    DECODING.get()
 }
 
 fn decode_by(decoder: Decoder, bytes: &[u8], limits: &Limits) -> Result<Picture> {

@@ -395,3 +395,16 @@ fn random_changes_never_panic() {
         }
     }
 }
+
+/// What a program's panic hook asks, so that the error alone is told.
+#[test]
+fn a_decoder_that_panics_is_a_damaged_file_and_is_known_to_be_at_work() {
+    assert!(!is_decoding());
+    let refused = guarded(|| {
+        assert!(!is_decoding(), "it is");
+        Err(Error::input("it is not known"))
+    });
+    let refused = refused.unwrap_err().to_string();
+    assert!(refused.contains("the file is damaged"), "{refused}");
+    assert!(!is_decoding());
+}
