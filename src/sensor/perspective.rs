@@ -27,7 +27,7 @@ const HALF_DIAGONAL: f64 = 21.633_307_652_783_937;
 /// How wide the view is.
 pub(crate) const FIELD_OF_VIEW: &[Row] = &[
     float("fov", 0.0, "field of view in degrees, below 180")
-        .above_to(180.0)
+        .positive()
         .absent("from focal_length"),
     choice(
         "fov_axis",
@@ -57,7 +57,7 @@ pub(crate) fn tangent_x(properties: &Properties<'_>, aspect: f64) -> Result<f64>
     if properties.has("focal_length") {
         return Err(properties.error("focal_length", "fov and focal_length exclude each other"));
     }
-    if fov == 180.0 {
+    if fov >= 180.0 {
         return Err(properties.error("fov", "a field of view is less than 180°"));
     }
     let tangent = (fov.to_radians() / 2.0).tan();

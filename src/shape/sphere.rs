@@ -34,7 +34,11 @@ pub(super) const PLUGIN: Plugin = Plugin {
         super::COMMON,
         &[
             vector("center", [0.0; 3], "its centre"),
-            float("radius", 1.0, "scene units").positive(),
+            float(
+                "radius",
+                1.0,
+                "scene units, not 0; below 0 turns the sphere inside out",
+            ),
             super::FLIP_NORMALS,
         ],
     ],
@@ -44,17 +48,19 @@ pub(super) fn build(properties: &Properties<'_>, outer: &DMat4) -> Result<Shape>
     let to_world = to_world(properties, outer)?;
     let center = properties.vector("center")?;
     let radius = properties.float("radius")?;
-    let axes = [to_world.x_axis, to_world.y_axis, to_world.z_axis].map(|a| a.truncate());
+    // A negative radius is a scale: it mirrors.
+    let axes = [to_world.x_axis, to_world.y_axis, to_world.z_axis]
+        .map(|axis| radius.signum() * axis.truncate());
     // Mitsuba's radius, whatever the other axes are.
     let scale = axes[0].length();
     let uneven = axes.iter().any(|a| (a.length() / scale - 1.0).abs() > 1e-4)
         || (0..3).any(|i| axes[i].dot(axes[(i + 1) % 3]).abs() > 1e-4 * scale * scale);
     let (center, radius) = (
         to_world.transform_point3(center).as_vec3(),
-        (radius * scale) as f32,
+        (radius.abs() * scale) as f32,
     );
     if !(radius > 0.0 && radius.is_finite() && center.is_finite()) {
-        return Err(properties.error("radius", "a sphere needs a positive, finite radius"));
+        return Err(properties.error("radius", "a sphere needs a finite radius other than 0"));
     }
     let turned = if uneven {
         right_angled(axes)

@@ -472,7 +472,7 @@ fn surfaces_of_no_extent_are_refused() {
     for text in [
         r#"<shape type="cylinder"><float name="radius" value="0"/></shape>"#,
         r#"<shape type="cylinder"><point name="p0" value="0, 0, 1"/></shape>"#,
-        r#"<shape type="sphere"><float name="radius" value="-1"/></shape>"#,
+        r#"<shape type="sphere"><float name="radius" value="0"/></shape>"#,
     ] {
         let text = format!(r#"<scene version="3.0.0">{text}</scene>"#);
         let scene = Description::parse(&text, Path::new("test.xml"), &Options::default()).unwrap();
@@ -481,6 +481,19 @@ fn surfaces_of_no_extent_are_refused() {
             "{text}"
         );
     }
+}
+
+/// As Mitsuba 3.9.1 renders both.
+#[test]
+fn a_sphere_of_negative_radius_is_one_that_is_scaled_by_a_negative_number() {
+    let negative = geometry(
+        r#"<shape type="sphere"><point name="center" value="1, 0, 0"/><float name="radius" value="-2"/></shape>"#,
+    );
+    let mirrored = geometry(
+        r#"<shape type="sphere"><transform name="to_world"><scale value="-2"/><translate x="1"/></transform></shape>"#,
+    );
+    let told = |sphere: &Geometry| format!("{sphere:?}").replace("-0.0", "0.0");
+    assert_eq!(told(&negative), told(&mirrored));
 }
 
 #[test]

@@ -194,7 +194,7 @@ const CASES: &[Case<'static>] = &[
     ),
     wrong(
         "a negative radius",
-        r#"<shape type="sphere"><float name="radius" value="-1"/><!--!--></shape>"#,
+        r#"<shape type="cone"><float name="radius" value="-1"/><!--!--></shape>"#,
         &["radius", "-1"],
     ),
     wrong(
