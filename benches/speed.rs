@@ -12,7 +12,8 @@ use divan::{Bencher, black_box};
 use etendue::accel::{Counts, Method, Tracer};
 use etendue::description::{self, Description, Kind};
 use etendue::interaction::{Hit, Ray};
-use etendue::math::{random, warp};
+use etendue::lanes::warp;
+use etendue::math::random;
 use etendue::mesh;
 use etendue::render::{Colors, Options, Overrides, Silent, render};
 use etendue::sampler::{Sampler, Stream};
@@ -41,7 +42,8 @@ fn unit(seed: u64, i: u32) -> f32 {
 }
 
 fn direction(seed: u64, i: u32) -> Vec3 {
-    warp::uniform_sphere(Vec2::new(unit(seed, 2 * i), unit(seed, 2 * i + 1)))
+    let u = Vec2::new(unit(seed, 2 * i), unit(seed, 2 * i + 1));
+    warp::uniform_sphere::<f32>(u.into()).into()
 }
 
 /// From outside, side by side, as a camera's.

@@ -1,9 +1,14 @@
 //! Rays, hits and what a hit looks like to a material: the small types that the layers above pass around.
 
+pub mod offset;
+mod points;
+
 use glam::{Vec2, Vec3};
 
-use crate::math::{Frame, Transform, offset};
+use crate::math::{Frame, Transform};
 use crate::mesh::Mesh;
+
+pub use points::{Points, ShadowRays, Source};
 
 /// Half a line: points `origin + t·direction` for t in (0, `t_max`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -128,9 +133,8 @@ impl Interaction<'_> {
 
     /// A ray from here toward `direction` (unit length), off the surface by its rounding error.
     pub fn spawn(&self, direction: Vec3) -> Ray {
-        let origin = offset::offset(self.position, self.error, self.normal, direction);
         Ray {
-            origin,
+            origin: self.offset(direction),
             direction,
             t_max: f32::INFINITY,
             time: self.time,
@@ -139,12 +143,7 @@ impl Interaction<'_> {
 
     /// A ray from here to just before `target`, for asking whether it can be seen.
     pub fn spawn_to(&self, target: Vec3) -> Ray {
-        let origin = offset::offset(
-            self.position,
-            self.error,
-            self.normal,
-            target - self.position,
-        );
+        let origin = self.offset(target - self.position);
         let way = target - origin;
         let distance = way.length();
         Ray {
@@ -153,6 +152,11 @@ impl Interaction<'_> {
             t_max: distance * (1.0 - SHADOW_EPSILON),
             time: self.time,
         }
+    }
+
+    fn offset(&self, direction: Vec3) -> Vec3 {
+        let (position, error) = (self.position.into(), self.error.into());
+        offset::offset(position, error, self.normal.into(), direction.into()).into()
     }
 
     /// The same point after `transform`, seen along the world direction `direction`.

@@ -7,6 +7,8 @@ pub mod error;
 pub mod file;
 pub mod math;
 
+pub mod lanes;
+
 pub mod color;
 
 pub mod description;

@@ -7,6 +7,7 @@
 
 mod boxes;
 mod group;
+mod met;
 mod triangle;
 mod walk;
 mod wide;
@@ -18,13 +19,13 @@ use rayon::prelude::*;
 
 use crate::error::{Error, Problem};
 use crate::interaction::{Hit, Interaction, Ray};
+use crate::lanes::Kernel;
 use crate::math::Transform;
 use crate::shape::{Bounds, Geometry};
 
 use group::{Group, Members, Shapes};
+pub use met::Met;
 use walk::Walk;
-
-pub use wide::Kernel;
 
 /// What tracing costs, counted: the same on every machine.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -215,6 +216,11 @@ impl Tracer {
     #[must_use]
     pub fn with_kernel(self, kernel: Kernel) -> Self {
         Self { kernel, ..self }
+    }
+
+    /// The instructions that it uses, and whoever works with its hits.
+    pub fn kernel(&self) -> Kernel {
+        self.kernel
     }
 
     /// The first hit of each ray, in the order of the rays. A ray that is not finite meets nothing.

@@ -7,7 +7,8 @@ use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3};
 
 use super::*;
 use crate::description::{Description, Kind, Options};
-use crate::math::{random, warp};
+use crate::lanes::warp;
+use crate::math::random;
 use crate::mesh::Mesh;
 use crate::shape::{self, TriangleMesh};
 
@@ -181,7 +182,7 @@ fn every_surface_is_met_where_its_twin_of_triangles_is_under_any_affine_map() {
                     1.8 * f64::from(uniform(14, j)) - 0.9,
                     f64::from(uniform(15, j)),
                 ));
-                let way = warp::uniform_sphere(square(16, j));
+                let way = Vec3::from(warp::uniform_sphere(square(16, j).into()));
                 let ray = ray(inside.as_vec3() - 7.0 * way, way);
                 let (Some(a), Some(b)) = (meet(&surface, &ray), meet(&twin, &ray)) else {
                     continue;
@@ -241,13 +242,13 @@ fn a_ray_that_leaves_a_convex_surface_outward_meets_it_no_more_at_any_scale() {
                         f64::from(uniform(19, j)),
                     );
                     let target = place.transform_point3(local).as_vec3();
-                    let way = warp::uniform_sphere(square(20, j));
+                    let way = Vec3::from(warp::uniform_sphere(square(20, j).into()));
                     let ray = ray(target - 5.0 * scale as f32 * way, way);
                     let Some(at) = meet(&tracer, &ray).filter(|at| at.wi.z > 0.0) else {
                         continue;
                     };
                     // Half of them within a thousandth of the horizon.
-                    let up = warp::cosine_hemisphere(square(21, j));
+                    let up = Vec3::from(warp::cosine_hemisphere(square(21, j).into()));
                     let up = match j % 2 {
                         0 => up,
                         _ => Vec3::new(up.x, up.y, 1e-3 * up.z).normalize(),

@@ -4,7 +4,8 @@ use std::path::Path;
 
 use super::*;
 use crate::description::{Description, Kind, Options, Properties};
-use crate::math::{random, warp};
+use crate::lanes::warp;
+use crate::math::random;
 use crate::mesh::{self, Mesh};
 use crate::shape::{self, TriangleMesh};
 use glam::{DMat4, DVec3, Vec2, Vec3};
@@ -14,7 +15,9 @@ fn uniform(seed: u64, i: u32) -> f32 {
 }
 
 pub(super) fn direction(seed: u64, i: u32) -> Vec3 {
-    warp::uniform_sphere(Vec2::new(uniform(seed, 2 * i), uniform(seed, 2 * i + 1)))
+    Vec3::from(warp::uniform_sphere(
+        Vec2::new(uniform(seed, 2 * i), uniform(seed, 2 * i + 1)).into(),
+    ))
 }
 
 /// Rays from points in and around the unit ball, some along axes and some aimed at vertices.
@@ -385,7 +388,9 @@ fn a_ray_never_meets_the_surface_that_it_leaves() {
                 assert!(!hits[0].is_miss());
                 let at = tracer.interaction(&ray, &hits[0]);
                 // Upward, half of them within a thousandth of the horizon.
-                let up = warp::cosine_hemisphere(Vec2::new(uniform(3, i), uniform(4, i)));
+                let up = Vec3::from(warp::cosine_hemisphere(
+                    Vec2::new(uniform(3, i), uniform(4, i)).into(),
+                ));
                 let up = if i % 2 == 0 {
                     up
                 } else {

@@ -9,8 +9,9 @@ use super::cie;
 use super::d65::d65;
 use super::model::{Color, ColorModel, Role, xyz_to_rgb};
 use super::rgb::{check, curve};
-use super::samples::{Samples, Spectral};
+use super::samples::{Columns, Samples, Spectral};
 use super::upsample::{Sigmoid, Table, fit};
+use crate::lanes::{Kernel, Lanes, Task};
 
 /// Up to `N` bands in `N` lanes; lanes in excess carry nothing.
 #[derive(Clone, Copy, Debug)]
@@ -89,6 +90,11 @@ impl<const N: usize> ColorModel for Bands<N> {
     /// nm; 0 in the lanes that are not in use.
     type Wavelengths = [f32; N];
     type Sample = Samples<N>;
+    type Columns<F: Lanes> = Columns<F, N>;
+
+    fn run<T: Task>(_kernel: Kernel, task: T) -> T::Output {
+        task.run::<f32>()
+    }
 
     #[inline]
     fn wavelengths(&self, u: impl FnOnce() -> f32) -> [f32; N] {

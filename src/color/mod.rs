@@ -19,4 +19,4 @@ pub use model::{Color, ColorModel, Role, luminance, rgb_to_xyz, xyz_to_rgb};
 pub use mono::Mono;
 pub use primaries::Primaries;
 pub use rgb::Rgb;
-pub use samples::{Samples, Spectral};
+pub use samples::{Columns, Samples, Spectra, Spectral};

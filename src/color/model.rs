@@ -2,7 +2,8 @@
 //! light is generic over [`ColorModel`]; geometry is not. A scene holds colours in their stored form, made
 //! once while it is built, and a path evaluates them at its own wavelengths.
 
-use super::samples::Spectral;
+use super::samples::{Spectra, Spectral};
+use crate::lanes::{Kernel, Lanes, Task};
 
 /// A colour as a scene file gives it.
 #[derive(Clone, Debug, PartialEq)]
@@ -53,6 +54,12 @@ pub trait ColorModel: Clone + std::fmt::Debug + Send + Sync + 'static {
     type Wavelengths: Copy + std::fmt::Debug + Send + Sync;
     /// One value for each of them.
     type Sample: Spectral;
+    /// The samples of paths in lanes.
+    type Columns<F: Lanes>: Spectra<F>;
+
+    /// Does `task`, which is of this model, with the instructions of `kernel`. Models of many channels do it with one lane:
+    /// more would take all the registers there are, and twice as long to compile.
+    fn run<T: Task>(kernel: Kernel, task: T) -> T::Output;
 
     /// The wavelengths of a path, from a random number in [0, 1), which is drawn where there are any.
     fn wavelengths(&self, u: impl FnOnce() -> f32) -> Self::Wavelengths;
@@ -70,6 +77,14 @@ pub trait ColorModel: Clone + std::fmt::Debug + Send + Sync + 'static {
     }
     /// A stored colour at a path's wavelengths.
     fn evaluate(stored: &Self::Stored, wavelengths: &Self::Wavelengths) -> Self::Sample;
+    /// The same for paths in lanes, whose wavelengths are given from the first lane on.
+    #[inline(always)]
+    fn evaluate_lanes<F: Lanes>(
+        stored: &Self::Stored,
+        wavelengths: &[Self::Wavelengths],
+    ) -> Self::Columns<F> {
+        Spectra::from_samples(|lane| Self::evaluate(stored, &wavelengths[lane]))
+    }
     /// A texel of linear BT.709 in its stored form; reflectances are clamped to [0, 1].
     fn texel(&self, rgb: [f32; 3], role: Role) -> Self::Texel;
     /// A texel at a path's wavelengths.

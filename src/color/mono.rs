@@ -3,7 +3,8 @@
 
 use super::model::{Color, ColorModel, Role, luminance};
 use super::rgb::{Rgb, check};
-use super::samples::Samples;
+use super::samples::{Columns, Samples};
+use crate::lanes::{Kernel, Lanes, Task};
 
 /// The model of plain numbers; a colour counts as its luminance.
 #[derive(Clone, Copy, Debug, Default)]
@@ -14,6 +15,11 @@ impl ColorModel for Mono {
     type Texel = f32;
     type Wavelengths = ();
     type Sample = Samples<1>;
+    type Columns<F: Lanes> = Columns<F, 1>;
+
+    fn run<T: Task>(kernel: Kernel, task: T) -> T::Output {
+        kernel.run(task)
+    }
 
     fn wavelengths(&self, _u: impl FnOnce() -> f32) {}
 
@@ -37,6 +43,11 @@ impl ColorModel for Mono {
 
     fn evaluate(stored: &f32, _wavelengths: &()) -> Samples<1> {
         Samples([*stored])
+    }
+
+    #[inline(always)]
+    fn evaluate_lanes<F: Lanes>(stored: &f32, _wavelengths: &[()]) -> Columns<F, 1> {
+        Columns([F::splat(*stored)])
     }
 
     fn texel(&self, rgb: [f32; 3], role: Role) -> f32 {

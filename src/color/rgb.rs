@@ -4,7 +4,8 @@
 use super::cie;
 use super::d65::d65;
 use super::model::{Color, ColorModel, Role, luminance, xyz_to_rgb};
-use super::samples::Samples;
+use super::samples::{Columns, Samples};
+use crate::lanes::{Kernel, Lanes, Task};
 
 /// The RGB colour model.
 #[derive(Clone, Copy, Debug, Default)]
@@ -15,6 +16,11 @@ impl ColorModel for Rgb {
     type Texel = [f32; 3];
     type Wavelengths = ();
     type Sample = Samples<3>;
+    type Columns<F: Lanes> = Columns<F, 3>;
+
+    fn run<T: Task>(kernel: Kernel, task: T) -> T::Output {
+        kernel.run(task)
+    }
 
     fn wavelengths(&self, _u: impl FnOnce() -> f32) {}
 
@@ -60,6 +66,11 @@ impl ColorModel for Rgb {
     #[inline]
     fn evaluate(stored: &[f32; 3], _wavelengths: &()) -> Samples<3> {
         Samples(*stored)
+    }
+
+    #[inline(always)]
+    fn evaluate_lanes<F: Lanes>(&[r, g, b]: &[f32; 3], _wavelengths: &[()]) -> Columns<F, 3> {
+        Columns([F::splat(r), F::splat(g), F::splat(b)])
     }
 
     fn texel(&self, rgb: [f32; 3], role: Role) -> [f32; 3] {

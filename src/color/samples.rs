@@ -1,6 +1,9 @@
-//! What a path carries: one value for each channel or band, with arithmetic channel by channel.
+//! What a path carries: one value for each channel or band, with arithmetic channel by channel; and what the paths of a
+//! block carry, a column of lanes a channel.
 
 use std::ops::{Add, AddAssign, Div, Index, IndexMut, Mul, MulAssign, Sub};
+
+use crate::lanes::{Lanes, Mask as _};
 
 /// The operations on one value a channel that light transport needs.
 pub trait Spectral:
@@ -113,5 +116,162 @@ impl<const N: usize> Div<f32> for Samples<N> {
     #[inline]
     fn div(self, divisor: f32) -> Self {
         self * (1.0 / divisor)
+    }
+}
+
+/// The operations on a column of lanes a channel that light transport needs.
+pub trait Spectra<F: Lanes>:
+    Copy
+    + std::fmt::Debug
+    + Add<Output = Self>
+    + Mul<Output = Self>
+    + Mul<F, Output = Self>
+    + Index<usize, Output = F>
+{
+    /// How many channels.
+    const CHANNELS: usize;
+    /// A row of lanes a channel.
+    type Rows;
+
+    /// The rows of its lanes.
+    fn rows(self) -> Self::Rows;
+    /// One lane's sample, of rows.
+    fn of<S: Spectral>(rows: &Self::Rows, lane: usize) -> S;
+    /// The same in every channel.
+    fn splat(value: F) -> Self;
+    /// Each lane's sample, from the first lane on.
+    fn from_samples<S: Spectral>(sample: impl FnMut(usize) -> S) -> Self;
+    /// `yes` where the mask is set, else `no`.
+    fn select(mask: F::Mask, yes: Self, no: Self) -> Self;
+    /// With another channel.
+    #[must_use]
+    fn with(self, channel: usize, value: F) -> Self;
+
+    /// Darkness.
+    #[inline(always)]
+    fn zero() -> Self {
+        Self::splat(F::zero())
+    }
+    /// One lane's sample.
+    #[inline(always)]
+    fn sample<S: Spectral>(&self, lane: usize) -> S {
+        S::from_fn(|channel| self[channel].lane(lane))
+    }
+    /// The largest value of each lane, at least 0.
+    #[inline(always)]
+    fn max_value(self) -> F {
+        let mut largest = F::zero();
+        for channel in 0..Self::CHANNELS {
+            largest = largest.max(self[channel]);
+        }
+        largest
+    }
+    /// Where every value is zero.
+    #[inline(always)]
+    fn is_black(self) -> F::Mask {
+        let mut black = F::Mask::splat(true);
+        for channel in 0..Self::CHANNELS {
+            black = black & self[channel].eq(F::zero());
+        }
+        black
+    }
+}
+
+/// A column of lanes for each of `N` channels.
+#[derive(Clone, Copy, Debug)]
+pub struct Columns<F, const N: usize>(pub [F; N]);
+
+impl<F: Lanes, const N: usize> Spectra<F> for Columns<F, N> {
+    const CHANNELS: usize = N;
+    type Rows = [F::Row; N];
+
+    #[inline(always)]
+    fn rows(self) -> [F::Row; N] {
+        let mut rows = [F::ROW; N];
+        for (row, column) in rows.iter_mut().zip(self.0) {
+            column.store(row);
+        }
+        rows
+    }
+
+    #[inline(always)]
+    fn of<S: Spectral>(rows: &[F::Row; N], lane: usize) -> S {
+        S::from_fn(|channel| rows[channel][lane])
+    }
+
+    #[inline(always)]
+    fn splat(value: F) -> Self {
+        Self([value; N])
+    }
+
+    #[inline(always)]
+    fn from_samples<S: Spectral>(mut sample: impl FnMut(usize) -> S) -> Self {
+        let mut rows = [F::ROW; N];
+        for lane in 0..F::WIDTH {
+            let sample = sample(lane);
+            for (channel, row) in rows.iter_mut().enumerate() {
+                row[lane] = sample[channel];
+            }
+        }
+        let mut columns = Self::splat(F::zero());
+        for (column, row) in columns.0.iter_mut().zip(&rows) {
+            *column = F::load(row);
+        }
+        columns
+    }
+
+    #[inline(always)]
+    fn select(mask: F::Mask, yes: Self, mut no: Self) -> Self {
+        for (no, yes) in no.0.iter_mut().zip(yes.0) {
+            *no = F::select(mask, yes, *no);
+        }
+        no
+    }
+
+    #[inline(always)]
+    fn with(mut self, channel: usize, value: F) -> Self {
+        self.0[channel] = value;
+        self
+    }
+}
+
+impl<F, const N: usize> Index<usize> for Columns<F, N> {
+    type Output = F;
+    #[inline(always)]
+    fn index(&self, i: usize) -> &F {
+        &self.0[i]
+    }
+}
+
+impl<F: Lanes, const N: usize> Add for Columns<F, N> {
+    type Output = Self;
+    #[inline(always)]
+    fn add(mut self, other: Self) -> Self {
+        for (a, b) in self.0.iter_mut().zip(other.0) {
+            *a = *a + b;
+        }
+        self
+    }
+}
+
+impl<F: Lanes, const N: usize> Mul for Columns<F, N> {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(mut self, other: Self) -> Self {
+        for (a, b) in self.0.iter_mut().zip(other.0) {
+            *a = *a * b;
+        }
+        self
+    }
+}
+
+impl<F: Lanes, const N: usize> Mul<F> for Columns<F, N> {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(mut self, factor: F) -> Self {
+        for a in &mut self.0 {
+            *a = *a * factor;
+        }
+        self
     }
 }

@@ -4,7 +4,7 @@ use super::Kernel;
 use crate::description::Properties;
 use crate::description::declared::{Plugin, float};
 use crate::error::Result;
-use crate::math::exp::exp;
+use crate::lanes::exp;
 
 /// A truncated Gaussian.
 #[derive(Clone, Debug)]

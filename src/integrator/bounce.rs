@@ -6,6 +6,7 @@
 use glam::Vec2;
 
 use super::FIRST_DIMENSION;
+use crate::lanes::{self, Lanes, MAX_LANES};
 use crate::sampler::{Sampler, Stream};
 
 /// Dimensions of a decision.
@@ -18,13 +19,18 @@ pub(super) struct Bounces {
 }
 
 impl Bounces {
-    /// Goes on to the numbers of the bounce at `depth`; `None` where the path has used up all that there are.
-    #[inline]
-    pub(super) fn begin(&self, stream: &mut Stream, depth: u32) -> Option<()> {
+    /// The first dimension of the bounce at `depth`; `None` where the path has used up all that there are.
+    pub(super) fn first(&self, depth: u32) -> Option<u32> {
         let size = self.decisions.checked_mul(DIMENSIONS)?;
         let first = depth.checked_mul(size)?.checked_add(FIRST_DIMENSION)?;
         first.checked_add(size)?;
-        stream.seek(first);
+        Some(first)
+    }
+
+    /// Goes on to the numbers of the bounce at `depth`; `None` where the path has used up all that there are.
+    #[inline]
+    pub(super) fn begin(&self, stream: &mut Stream, depth: u32) -> Option<()> {
+        stream.seek(self.first(depth)?);
         Some(())
     }
 }
@@ -36,6 +42,70 @@ pub(super) struct Decision {
     pub(super) u2: Vec2,
     /// For which light or lobe.
     pub(super) u1: f32,
+}
+
+/// The numbers of a decision of paths in lanes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Decisions<'a> {
+    sampler: &'a Sampler,
+    /// Of each path, from the first lane on.
+    streams: &'a [Stream],
+    /// The decision's first dimension.
+    first: u32,
+}
+
+impl<'a> Decisions<'a> {
+    /// Those of decision `number` of a bounce whose first dimension is `first`.
+    pub(super) fn new(
+        sampler: &'a Sampler,
+        streams: &'a [Stream],
+        first: u32,
+        number: u32,
+    ) -> Self {
+        Self {
+            sampler,
+            streams,
+            first: first + number * DIMENSIONS,
+        }
+    }
+
+    /// [`Decision::u2`].
+    #[inline(always)]
+    pub(super) fn u2<F: Lanes>(&self) -> lanes::Vec2<F> {
+        let mut pairs = [Vec2::ZERO; MAX_LANES];
+        let pairs = &mut pairs[..self.streams.len()];
+        self.sampler.fill_2d(self.streams, self.first, pairs);
+        let mut rows = [F::ROW; 2];
+        for (lane, pair) in pairs.iter().enumerate() {
+            (rows[0][lane], rows[1][lane]) = (pair.x, pair.y);
+        }
+        lanes::Vec2::<F>::load(&rows)
+    }
+
+    /// [`Decision::u1`].
+    #[inline(always)]
+    pub(super) fn u1<F: Lanes>(&self) -> F {
+        self.number(2)
+    }
+
+    /// The number for whether the path goes on.
+    #[inline(always)]
+    pub(super) fn survival<F: Lanes>(&self) -> F {
+        self.number(3)
+    }
+
+    #[inline(always)]
+    fn number<F: Lanes>(&self, dimension: u32) -> F {
+        let mut numbers = [0.0; MAX_LANES];
+        let numbers = &mut numbers[..self.streams.len()];
+        let dimension = self.first + dimension;
+        self.sampler.fill_1d(self.streams, dimension, numbers);
+        let mut row = F::ROW;
+        for (lane, number) in numbers.iter().enumerate() {
+            row[lane] = *number;
+        }
+        F::load(&row)
+    }
 }
 
 impl Decision {

@@ -78,7 +78,7 @@ impl Cost {
     pub(super) fn occluded<C: ColorModel>(
         &mut self,
         scene: &Scene<C>,
-        rays: impl ExactSizeIterator<Item = Ray>,
+        rays: &[Ray],
         blocked: &mut Vec<bool>,
     ) {
         let begin = Instant::now();

@@ -198,7 +198,8 @@ impl<C: ColorModel> Estimator<C> for Direct {
         }
 
         let mut blocked = Vec::new();
-        cost.occluded(scene, shadows.iter().map(|s| s.ray), &mut blocked);
+        let shadow_rays: Vec<Ray> = shadows.iter().map(|s| s.ray).collect();
+        cost.occluded(scene, &shadow_rays, &mut blocked);
         for (shadow, _) in shadows
             .iter()
             .zip(&blocked)

@@ -7,10 +7,12 @@
 //! divides its work, and have no effect here: tiles and passes are fixed, and what ends a render early is
 //! `--time-limit`, which says so.
 
-use crate::color::Spectral;
+use super::bounce::Decisions;
+use crate::color::{Spectra, Spectral};
 use crate::description::Properties;
 use crate::description::declared::{Row, boolean, float, integer};
 use crate::error::{Problem, Result};
+use crate::lanes::Lanes;
 
 const HIDE_EMITTERS: Row = boolean(
     "hide_emitters",
@@ -106,6 +108,27 @@ impl Limits {
         }
         let survival = (throughput.max_value() * eta * eta).min(MAX_SURVIVAL);
         (draw() < survival).then(|| throughput / survival)
+    }
+}
+
+impl Limits {
+    /// [`Limits::roulette`] of paths in lanes: the throughputs of those that live on.
+    #[inline(always)]
+    pub(super) fn roulettes<F: Lanes, S: Spectra<F>>(
+        &self,
+        depth: u32,
+        throughput: S,
+        eta: F,
+        decision: &Decisions<'_>,
+    ) -> (F::Mask, S) {
+        let lit = !throughput.is_black();
+        if depth + 1 < self.rr_depth {
+            return (lit, throughput);
+        }
+        let survival = throughput.max_value() * eta * eta;
+        let survival = survival.min(F::splat(MAX_SURVIVAL));
+        let lives = lit & decision.survival::<F>().lt(survival);
+        (lives, throughput * (F::one() / survival))
     }
 }
 

@@ -1,10 +1,12 @@
 //! Multiple importance sampling: two ways to find light, each weighted by how likely it was to find it
 //! (Veach and Guibas, *Optimally combining sampling techniques*, 1995).
 
+use crate::lanes::Lanes;
+
 /// The power heuristic (β = 2): the weight of a sample drawn with density `a`, which the other technique
 /// would have drawn with density `b`.
-#[inline]
-pub(super) fn power(a: f32, b: f32) -> f32 {
+#[inline(always)]
+pub(super) fn power<F: Lanes>(a: F, b: F) -> F {
     let ratio = b / a;
-    1.0 / (1.0 + ratio * ratio)
+    F::one() / (F::one() + ratio * ratio)
 }

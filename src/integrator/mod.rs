@@ -19,6 +19,7 @@ mod footprint;
 mod layers;
 mod limits;
 mod mis;
+mod runs;
 
 use crate::color::ColorModel;
 use crate::family::family;

@@ -4,16 +4,19 @@
 //! `max_depth`, `rr_depth` and `hide_emitters`: see [`super::limits`].
 
 use super::arrival::{Arrival, Scattered, look_through_emitters, opacity_at_start};
-use super::bounce::{Bounces, Decision};
+use super::bounce::{Bounces, Decisions};
 use super::limits::{self, Limits};
 use super::mis::power;
+use super::runs::Runs;
 use super::{Context, Cost, Estimate, Estimates, Estimator, Start};
-use crate::color::{ColorModel, Spectral};
+use crate::accel::Met;
+use crate::color::{ColorModel, Spectra as _, Spectral as _};
 use crate::description::Properties;
 use crate::description::declared::Plugin;
 use crate::error::Result;
-use crate::interaction::{Interaction, Ray};
-use crate::light::LightSample;
+use crate::interaction::{Hit, Points, Ray};
+use crate::lanes::{Lanes, MAX_LANES, Mask as _, Task};
+use crate::material::Material;
 use crate::sampler::{Sampler, Stream};
 use crate::scene::Scene;
 
@@ -26,11 +29,14 @@ pub struct Path {
 
 /// A bounce decides on a light and on the way on.
 const BOUNCES: Bounces = Bounces { decisions: 2 };
+/// The first decision.
+const LIGHT: u32 = 0;
+/// The second.
+const WAY: u32 = 1;
 
-/// A path on its way.
+/// A path on its way, beside its ray.
 #[derive(Clone, Copy, Debug)]
 struct Walker<C: ColorModel> {
-    ray: Ray,
     throughput: C::Sample,
     wavelengths: C::Wavelengths,
     stream: Stream,
@@ -42,12 +48,37 @@ struct Walker<C: ColorModel> {
     scattered: Option<Scattered>,
 }
 
-/// A light sample whose visibility is still to be asked.
+/// A light sample whose visibility is still to be asked, beside its ray.
 #[derive(Clone, Copy, Debug)]
 struct Shadow<S> {
-    ray: Ray,
     contribution: S,
     slot: u32,
+}
+
+/// Things with a ray each.
+#[derive(Debug)]
+struct WithRays<T> {
+    rays: Vec<Ray>,
+    things: Vec<T>,
+}
+
+impl<T> WithRays<T> {
+    fn new() -> Self {
+        Self {
+            rays: Vec::new(),
+            things: Vec::new(),
+        }
+    }
+
+    fn push(&mut self, ray: Ray, thing: T) {
+        self.rays.push(ray);
+        self.things.push(thing);
+    }
+
+    fn clear(&mut self) {
+        self.rays.clear();
+        self.things.clear();
+    }
 }
 
 impl Path {
@@ -63,75 +94,36 @@ impl Path {
         })
     }
 
-    /// Light drawn toward `at`, if any may arrive.
-    fn light<C: ColorModel>(
-        scene: &Scene<C>,
-        sampler: &Sampler,
-        walker: &mut Walker<C>,
-        at: &Interaction<'_>,
-    ) -> Option<Shadow<C::Sample>> {
-        let Decision { u2, u1 } = Decision::next(&mut walker.stream, sampler);
-        let material = scene.material(at);
-        if !material.is_smooth() {
-            return None;
-        }
-        let LightSample {
-            direction,
-            target,
-            radiance,
-            pdf,
-            delta,
-        } = scene.sample_light(at.position, u1, u2, &walker.wavelengths)?;
-        let value = material.eval(at, at.wi, at.frame.to_local(direction), &walker.wavelengths)?;
-        let weight = if delta { 1.0 } else { power(pdf, value.pdf) };
-        let contribution = walker.throughput * value.value * radiance * (weight / pdf);
-        if contribution.is_black() {
-            return None;
-        }
-        let ray = match target {
-            Some(target) => at.spawn_to(target),
-            None => at.spawn(direction),
-        };
-        Some(Shadow {
-            ray,
-            contribution,
-            slot: walker.slot,
-        })
-    }
-
-    /// Turns the path at `at`; whether it goes on.
-    fn scatter<C: ColorModel>(
+    /// Adds what the rays' ends bring.
+    fn arrive<C: ColorModel>(
         &self,
         scene: &Scene<C>,
-        sampler: &Sampler,
-        depth: u32,
-        walker: &mut Walker<C>,
-        at: &Interaction<'_>,
-        estimate: &mut Estimate<C::Sample>,
-    ) -> bool {
-        let Decision { u2, u1 } = Decision::next(&mut walker.stream, sampler);
-        let material = scene.material(at);
-        let sample = material.sample(at, at.wi, u1, u2, &walker.wavelengths);
-        if !sample.is_some_and(|sample| sample.null) {
-            estimate.alpha = 1.0;
+        walkers: &WithRays<Walker<C>>,
+        hits: &[Hit],
+        estimates: &mut [Estimate<C::Sample>],
+    ) {
+        for ((walker, ray), hit) in walkers.things.iter().zip(&walkers.rays).zip(hits) {
+            let brings_light = if hit.is_miss() {
+                scene.has_environment()
+            } else {
+                scene.gives_light(hit) || scene.has_ambient()
+            };
+            if !brings_light {
+                continue;
+            }
+            let estimate = &mut estimates[walker.slot as usize];
+            let at = (!hit.is_miss()).then(|| scene.interaction(ray, hit));
+            let arrival = Arrival {
+                scene,
+                ray,
+                at: at.as_ref(),
+                wavelengths: &walker.wavelengths,
+                throughput: walker.throughput,
+                scattered: walker.scattered,
+                hides_surroundings: self.hide_emitters && estimate.alpha == 0.0,
+            };
+            arrival.add_to(estimate);
         }
-        let Some(sample) = sample else {
-            return false;
-        };
-        walker.eta *= sample.eta;
-        walker.ray = at.spawn(at.frame.to_world(sample.wo));
-        walker.scattered = (!sample.delta).then_some(Scattered {
-            from: at.position,
-            pdf: sample.pdf,
-            light_share: 1.0,
-        });
-        let throughput = walker.throughput * sample.weight;
-        let draw = || walker.stream.next_1d(sampler);
-        match self.limits.roulette(depth, throughput, walker.eta, draw) {
-            Some(throughput) => walker.throughput = throughput,
-            None => return false,
-        }
-        true
     }
 }
 
@@ -155,68 +147,238 @@ impl<C: ColorModel> Estimator<C> for Path {
         if self.limits.max_depth == 0 {
             return;
         }
-        let mut walkers: Vec<Walker<C>> = starts
-            .iter()
-            .enumerate()
-            .map(|(slot, start)| Walker {
-                ray: start.ray,
+        let (mut walkers, mut next) = (WithRays::new(), WithRays::new());
+        for (slot, start) in (0..).zip(starts) {
+            let walker = Walker {
                 throughput: scene.color().unit(),
                 wavelengths: start.wavelengths,
                 stream: start.stream,
-                slot: slot as u32,
+                slot,
                 eta: 1.0,
                 scattered: None,
-            })
-            .collect();
-        let (mut rays, mut hits) = (Vec::new(), Vec::new());
-        let mut shadows: Vec<Shadow<C::Sample>> = Vec::with_capacity(starts.len());
-        let mut blocked = Vec::new();
+            };
+            walkers.push(start.ray, walker);
+        }
+        let (mut hits, mut blocked) = (Vec::new(), Vec::new());
+        let mut shadows = WithRays::new();
+        let mut runs = Runs::new(scene.material_count());
         for depth in 0.. {
-            if walkers.is_empty() {
+            if walkers.things.is_empty() {
                 break;
             }
-            rays.clear();
-            rays.extend(walkers.iter().map(|w| w.ray));
-            cost.closest(scene, depth, &rays, &mut hits);
-
+            cost.closest(scene, depth, &walkers.rays, &mut hits);
             if depth == 0 && self.hide_emitters {
-                look_through_emitters(scene, &mut rays, &mut hits, cost);
+                look_through_emitters(scene, &mut walkers.rays, &mut hits, cost);
             }
-
-            let mut ends = rays.iter().zip(&hits);
-            walkers.retain_mut(|walker| {
-                let (ray, hit) = ends.next().expect("every walker has its ray");
-                let estimate = &mut estimates[walker.slot as usize];
-                let at = (!hit.is_miss()).then(|| scene.interaction(ray, hit));
-                let arrival = Arrival {
-                    scene,
-                    ray,
-                    at: at.as_ref(),
-                    wavelengths: &walker.wavelengths,
-                    throughput: walker.throughput,
-                    scattered: walker.scattered,
-                    hides_surroundings: self.hide_emitters && estimate.alpha == 0.0,
-                };
-                arrival.add_to(estimate);
-                let Some(at) = at.filter(|_| depth + 1 < self.limits.max_depth) else {
-                    return false;
-                };
-                cost.stats.shaded += 1;
-                if BOUNCES.begin(&mut walker.stream, depth).is_none() {
-                    return false;
+            self.arrive(scene, &walkers, &hits, estimates);
+            let Some(first) = BOUNCES.first(depth) else {
+                break;
+            };
+            if depth + 1 >= self.limits.max_depth {
+                break;
+            }
+            runs.sort(hits.iter().map(|hit| {
+                let met = !hit.is_miss();
+                met.then(|| scene.material_of(hit).index())
+            }));
+            cost.stats.shaded += runs.count() as u64;
+            next.clear();
+            let scatter = Scatter {
+                limits: &self.limits,
+                scene,
+                sampler,
+                depth,
+                first,
+                walkers: &walkers,
+                hits: &hits,
+                runs: &runs,
+                estimates,
+                shadows: &mut shadows,
+                next: &mut next,
+            };
+            C::run(scene.tracer().kernel(), scatter);
+            cost.occluded(scene, &shadows.rays, &mut blocked);
+            for (shadow, blocked) in shadows.things.iter().zip(&blocked) {
+                if !blocked {
+                    estimates[shadow.slot as usize].radiance += shadow.contribution;
                 }
-                shadows.extend(Self::light(scene, sampler, walker, &at));
-                self.scatter(scene, sampler, depth, walker, &at, estimate)
-            });
-
-            cost.occluded(scene, shadows.iter().map(|s| s.ray), &mut blocked);
-            for (shadow, _) in shadows
-                .drain(..)
-                .zip(&blocked)
-                .filter(|(_, blocked)| !**blocked)
-            {
-                estimates[shadow.slot as usize].radiance += shadow.contribution;
             }
+            shadows.clear();
+            std::mem::swap(&mut walkers, &mut next);
+        }
+    }
+}
+
+/// A bounce: paths that have met surfaces are lit and scattered.
+struct Scatter<'a, C: ColorModel> {
+    limits: &'a Limits,
+    scene: &'a Scene<C>,
+    sampler: &'a Sampler,
+    depth: u32,
+    /// The bounce's first dimension.
+    first: u32,
+    walkers: &'a WithRays<Walker<C>>,
+    hits: &'a [Hit],
+    /// By material.
+    runs: &'a Runs,
+    estimates: &'a mut [Estimate<C::Sample>],
+    shadows: &'a mut WithRays<Shadow<C::Sample>>,
+    next: &'a mut WithRays<Walker<C>>,
+}
+
+/// Paths that have met one material.
+struct Block<'a, C: ColorModel> {
+    material: &'a Material<C>,
+    /// Which walkers.
+    indices: &'a [u32],
+    wavelengths: &'a [C::Wavelengths],
+    streams: &'a [Stream],
+}
+
+impl<C: ColorModel> Task for Scatter<'_, C> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<F: Lanes>(mut self) {
+        let Some(some) = self.walkers.things.first() else {
+            return;
+        };
+        let mut wavelengths = [some.wavelengths; MAX_LANES];
+        let mut streams = [some.stream; MAX_LANES];
+        for (material, run) in self.runs.iter() {
+            let material = self.scene.material_at(material);
+            for indices in run.chunks(F::WIDTH) {
+                for (lane, index) in indices.iter().enumerate() {
+                    let walker = &self.walkers.things[*index as usize];
+                    (wavelengths[lane], streams[lane]) = (walker.wavelengths, walker.stream);
+                }
+                let met = Met {
+                    tracer: self.scene.tracer(),
+                    rays: &self.walkers.rays,
+                    hits: self.hits,
+                    indices,
+                };
+                let block = Block {
+                    material,
+                    indices,
+                    wavelengths: &wavelengths,
+                    streams: &streams[..indices.len()],
+                };
+                self.block(&block, &met.points::<F>());
+            }
+        }
+    }
+}
+
+impl<C: ColorModel> Scatter<'_, C> {
+    #[inline(always)]
+    fn block<F: Lanes>(&mut self, block: &Block<'_, C>, at: &Points<'_, F>) {
+        let walkers = &self.walkers.things;
+        let throughput = C::Columns::<F>::from_samples(|lane| match block.indices.get(lane) {
+            Some(index) => walkers[*index as usize].throughput,
+            None => C::Sample::zero(),
+        });
+        if block.material.is_smooth() {
+            self.light(block, at, throughput);
+        }
+        self.way(block, at, throughput);
+    }
+
+    /// Draws light toward the points, where any may arrive.
+    #[inline(always)]
+    fn light<F: Lanes>(
+        &mut self,
+        block: &Block<'_, C>,
+        at: &Points<'_, F>,
+        throughput: C::Columns<F>,
+    ) {
+        let numbers = Decisions::new(self.sampler, block.streams, self.first, LIGHT);
+        let (u2, u1) = (numbers.u2::<F>(), numbers.u1::<F>());
+        let w = block.wavelengths;
+        let light = self.scene.sample_lights(at.position, u1, u2, w, at.active);
+        let wo = at.frame.to_local(light.direction);
+        let value = block.material.eval_lanes(at, at.wi, wo, w);
+        let weight = F::select(light.delta, F::one(), power(light.pdf, value.pdf));
+        let contribution = throughput * value.value * light.radiance * (weight / light.pdf);
+        let lit = at.active & F::zero().lt(light.pdf) & !contribution.is_black();
+        if !lit.any() {
+            return;
+        }
+        let rays = at.shadow(light.direction, light.target, light.distant);
+        let (origins, directions) = (rays.origin.rows(), rays.direction.rows());
+        let ends = rays.t_max.row();
+        let contributions = contribution.rows();
+        for lane in lit.lanes() {
+            let index = block.indices[lane] as usize;
+            let ray = Ray {
+                origin: glam::Vec3::from_array(origins.map(|row| row[lane])),
+                direction: glam::Vec3::from_array(directions.map(|row| row[lane])),
+                t_max: ends[lane],
+                time: self.walkers.rays[index].time,
+            };
+            let shadow = Shadow {
+                contribution: C::Columns::<F>::of(&contributions, lane),
+                slot: self.walkers.things[index].slot,
+            };
+            self.shadows.push(ray, shadow);
+        }
+    }
+
+    /// Turns the paths; those that go on are the next walkers.
+    #[inline(always)]
+    fn way<F: Lanes>(
+        &mut self,
+        block: &Block<'_, C>,
+        at: &Points<'_, F>,
+        throughput: C::Columns<F>,
+    ) {
+        let numbers = Decisions::new(self.sampler, block.streams, self.first, WAY);
+        let (u2, u1) = (numbers.u2::<F>(), numbers.u1::<F>());
+        let w = block.wavelengths;
+        let sample = block.material.sample_lanes(at, at.wi, u1, u2, w);
+        let walkers = &self.walkers.things;
+        for lane in (at.active & !(sample.drawn & sample.null)).lanes() {
+            let slot = walkers[block.indices[lane] as usize].slot;
+            self.estimates[slot as usize].alpha = 1.0;
+        }
+        let passed = F::from_fn(|lane| match block.indices.get(lane) {
+            Some(index) => walkers[*index as usize].eta,
+            None => 1.0,
+        });
+        let eta = passed * sample.eta;
+        let throughput = throughput * sample.weight;
+        let (lives, throughput) = self.limits.roulettes(self.depth, throughput, eta, &numbers);
+        let lives = lives & sample.drawn & at.active;
+        if !lives.any() {
+            return;
+        }
+        let direction = at.frame.to_world(sample.wo);
+        let (origins, directions) = (at.origin(direction).rows(), direction.rows());
+        let (places, throughputs) = (at.position.rows(), throughput.rows());
+        let (etas, pdfs) = (eta.row(), sample.pdf.row());
+        let delta = sample.delta.to_bits();
+        for lane in lives.lanes() {
+            let index = block.indices[lane] as usize;
+            let vector =
+                |rows: &[F::Row; 3]| glam::Vec3::new(rows[0][lane], rows[1][lane], rows[2][lane]);
+            let scattered = (delta >> lane & 1 == 0).then(|| Scattered {
+                from: vector(&places),
+                pdf: pdfs[lane],
+                light_share: 1.0,
+            });
+            let ray = Ray {
+                origin: vector(&origins),
+                direction: vector(&directions),
+                t_max: f32::INFINITY,
+                time: self.walkers.rays[index].time,
+            };
+            let walker = Walker {
+                throughput: C::Columns::<F>::of(&throughputs, lane),
+                eta: etas[lane],
+                scattered,
+                ..self.walkers.things[index]
+            };
+            self.next.push(ray, walker);
         }
     }
 }

@@ -109,8 +109,8 @@ impl<S: Spectral> Batch<'_, S> {
 
     /// Adds what the lights bring that can be seen.
     fn flush<C: ColorModel<Sample = S>>(&mut self, scene: &Scene<C>, cost: &mut Cost) {
-        let rays = self.shadows.iter().map(|s| s.ray);
-        cost.occluded(scene, rays, &mut self.blocked);
+        let rays: Vec<Ray> = self.shadows.iter().map(|s| s.ray).collect();
+        cost.occluded(scene, &rays, &mut self.blocked);
         let mut shadows = std::mem::take(&mut self.shadows);
         for (i, shadow) in shadows.iter().enumerate() {
             if !self.blocked[i] {

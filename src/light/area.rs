@@ -6,13 +6,15 @@ use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
 
+use super::block::BlockEmitter;
 use super::brightness::Brightness;
-use super::{Emitter, LightContext, LightSample, interaction, mean_of};
+use super::{Emitter, LightContext, LightSample, LightSamples, interaction, mean_of};
 use crate::color::{ColorModel, Role, Spectral};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, texture};
 use crate::error::Result;
 use crate::interaction::Interaction;
+use crate::lanes::{self, Lanes};
 use crate::shape::Geometry;
 use crate::texture::{Palettes, Texture};
 
@@ -60,6 +62,38 @@ impl<C: ColorModel> Area<C> {
             mean,
             brightness,
         })
+    }
+}
+
+impl<C: ColorModel> Area<C> {
+    /// Whether it is the same all over, so that it is written over lanes.
+    pub(super) fn is_even(&self) -> bool {
+        matches!(self.radiance, Texture::Uniform(_))
+    }
+}
+
+impl<C: ColorModel> BlockEmitter<C> for Area<C> {
+    #[inline(always)]
+    fn sample_lanes<F: Lanes>(
+        &self,
+        from: lanes::Vec3<F>,
+        u: lanes::Vec2<F>,
+        w: &[C::Wavelengths],
+        active: F::Mask,
+    ) -> LightSamples<F, C::Columns<F>> {
+        let Texture::Uniform(radiance) = &self.radiance else {
+            return LightSamples::none();
+        };
+        let point = self.shape.sample_lanes(from, u, active);
+        let direction = (point.position - from).normalize_or_zero();
+        let lit = direction.dot(point.normal).lt(F::zero());
+        LightSamples {
+            direction,
+            target: point.position,
+            radiance: C::evaluate_lanes(radiance.value(), w),
+            pdf: F::select(lit, point.pdf, F::zero()),
+            ..LightSamples::none()
+        }
     }
 }
 

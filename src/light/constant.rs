@@ -2,14 +2,13 @@
 
 use std::f32::consts::FRAC_1_PI;
 
-use glam::{Vec2, Vec3};
-
-use super::{Emitter, LightContext, LightSample, mean_of};
+use super::block::{self, BlockEmitter};
+use super::{Emitter, LightContext, LightSample, LightSamples, mean_of};
 use crate::color::{ColorModel, Role};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, color};
 use crate::error::Result;
-use crate::math::warp;
+use crate::lanes::{Lanes, Mask as _, Vec2, Vec3, warp};
 
 /// A uniform environment.
 #[derive(Clone, Debug)]
@@ -43,33 +42,48 @@ impl<C: ColorModel> Constant<C> {
     }
 }
 
+impl<C: ColorModel> BlockEmitter<C> for Constant<C> {
+    #[inline(always)]
+    fn sample_lanes<F: Lanes>(
+        &self,
+        _from: Vec3<F>,
+        u: Vec2<F>,
+        w: &[C::Wavelengths],
+        _active: F::Mask,
+    ) -> LightSamples<F, C::Columns<F>> {
+        LightSamples {
+            direction: warp::uniform_sphere(u),
+            distant: F::Mask::splat(true),
+            radiance: C::evaluate_lanes(&self.radiance, w),
+            pdf: F::splat(PDF),
+            ..LightSamples::none()
+        }
+    }
+}
+
 impl<C: ColorModel> Emitter<C> for Constant<C> {
     fn sample(
         &self,
-        _from: Vec3,
-        u: Vec2,
+        from: glam::Vec3,
+        u: glam::Vec2,
         wavelengths: &C::Wavelengths,
     ) -> Option<LightSample<C::Sample>> {
-        let direction = warp::uniform_sphere(u);
-        let radiance = C::evaluate(&self.radiance, wavelengths);
-        Some(LightSample {
-            direction,
-            target: None,
-            radiance,
-            pdf: PDF,
-            delta: false,
-        })
+        block::single_sample(self, from, u, wavelengths)
     }
 
     fn is_environment(&self) -> bool {
         true
     }
 
-    fn environment_radiance(&self, _direction: Vec3, wavelengths: &C::Wavelengths) -> C::Sample {
+    fn environment_radiance(
+        &self,
+        _direction: glam::Vec3,
+        wavelengths: &C::Wavelengths,
+    ) -> C::Sample {
         C::evaluate(&self.radiance, wavelengths)
     }
 
-    fn environment_pdf(&self, _direction: Vec3) -> f32 {
+    fn environment_pdf(&self, _direction: glam::Vec3) -> f32 {
         PDF
     }
 

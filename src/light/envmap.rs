@@ -9,11 +9,13 @@ use std::f32::consts::{PI, TAU};
 
 use glam::{Mat3, Vec2, Vec3};
 
-use super::{Emitter, LightContext, LightSample, rotation};
-use crate::color::{ColorModel, Role, luminance};
+use super::block::{self, BlockEmitter};
+use super::{Emitter, LightContext, LightSample, LightSamples, rotation};
+use crate::color::{ColorModel, Role, Spectra, Spectral, luminance};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, boolean, file, float};
 use crate::error::Result;
+use crate::lanes::{self, Lanes, Mask as _};
 use crate::math::distribution::Grid;
 use crate::texture::Picture;
 
@@ -81,21 +83,38 @@ impl<C: ColorModel> Envmap<C> {
         })
     }
 
-    /// Where a direction lies.
-    fn point(&self, direction: Vec3) -> Point {
-        let local = self.to_world.transpose() * direction;
-        let u = local.x.atan2(-local.z) / TAU - 0.5 / self.width as f32;
+    /// Where directions lie.
+    #[inline(always)]
+    fn point<F: Lanes>(&self, direction: lanes::Vec3<F>) -> lanes::Vec2<F> {
+        let across = |axis: Vec3| direction.dot(lanes::Vec3::all(axis));
+        let Mat3 {
+            x_axis,
+            y_axis,
+            z_axis,
+        } = self.to_world;
+        let (x, y, z) = (across(x_axis), across(y_axis), across(z_axis));
+        let half = F::splat(0.5 / self.width as f32);
+        let u = lanes::atan2(x, -z) * F::splat(1.0 / TAU) - half;
         // Not the arc cosine, which has no precision at the poles.
-        let v = local.x.hypot(local.z).atan2(local.y) / PI;
-        Vec2::new(u - u.floor(), v)
+        let v = lanes::atan2((x * x + z * z).sqrt(), y) * F::splat(1.0 / PI);
+        lanes::Vec2::new(u - u.floor(), v)
     }
 
-    /// The direction that lies there, and the sine of its polar angle.
-    fn direction(&self, p: Point) -> (Vec3, f32) {
-        let (sin_phi, cos_phi) = (TAU * (p.x + 0.5 / self.width as f32)).sin_cos();
-        let (sin, cos) = (PI * p.y).sin_cos();
-        let local = Vec3::new(sin * sin_phi, cos, -sin * cos_phi);
-        ((self.to_world * local).normalize(), sin)
+    /// The directions that lie there, and the sines of their polar angles.
+    #[inline(always)]
+    fn direction<F: Lanes>(&self, p: lanes::Vec2<F>) -> (lanes::Vec3<F>, F) {
+        let half = F::splat(0.5 / self.width as f32);
+        let (sin_phi, cos_phi) = lanes::sin_cos_turns(p.x + half);
+        let (sin, cos) = lanes::sin_cos(p.y * F::splat(PI));
+        let all = |axis: Vec3| lanes::Vec3::all(axis);
+        let Mat3 {
+            x_axis,
+            y_axis,
+            z_axis,
+        } = self.to_world;
+        let world =
+            all(x_axis) * (sin * sin_phi) + all(y_axis) * cos - all(z_axis) * (sin * cos_phi);
+        (world.normalize(), sin)
     }
 
     fn radiance(&self, p: Point, wavelengths: &C::Wavelengths) -> C::Sample {
@@ -110,8 +129,9 @@ impl<C: ColorModel> Envmap<C> {
     }
 
     /// Density per solid angle of a point drawn with that density.
-    fn per_solid_angle(density: f32, sine: f32) -> f32 {
-        density / (TAU * PI * sine.max(LEAST_SINE))
+    #[inline(always)]
+    fn per_solid_angle<F: Lanes>(density: F, sine: F) -> F {
+        density / (F::splat(TAU * PI) * sine.max(F::splat(LEAST_SINE)))
     }
 }
 
@@ -143,22 +163,47 @@ fn weights(picture: &Picture) -> Vec<f64> {
     weights
 }
 
+impl<C: ColorModel> BlockEmitter<C> for Envmap<C> {
+    #[inline(always)]
+    fn sample_lanes<F: Lanes>(
+        &self,
+        _from: lanes::Vec3<F>,
+        u: lanes::Vec2<F>,
+        w: &[C::Wavelengths],
+        active: F::Mask,
+    ) -> LightSamples<F, C::Columns<F>> {
+        let Some(cells) = &self.cells else {
+            return LightSamples::none();
+        };
+        let (mut place, mut density) = ([F::ROW; 2], F::ROW);
+        let there = active.to_bits();
+        let radiance = Spectra::from_samples(|lane| {
+            if there >> lane & 1 == 0 {
+                return C::Sample::zero();
+            }
+            let (p, drawn) = cells.sample(u.lane(lane));
+            (place[0][lane], place[1][lane], density[lane]) = (p.x, p.y, drawn);
+            self.radiance(p, &w[lane])
+        });
+        let (direction, sine) = self.direction(lanes::Vec2::<F>::load(&place));
+        LightSamples {
+            direction,
+            distant: F::Mask::splat(true),
+            radiance,
+            pdf: Self::per_solid_angle(F::load(&density), sine),
+            ..LightSamples::none()
+        }
+    }
+}
+
 impl<C: ColorModel> Emitter<C> for Envmap<C> {
     fn sample(
         &self,
-        _from: Vec3,
+        from: Vec3,
         u: Vec2,
         wavelengths: &C::Wavelengths,
     ) -> Option<LightSample<C::Sample>> {
-        let (p, density) = self.cells.as_ref()?.sample(u);
-        let (direction, sine) = self.direction(p);
-        Some(LightSample {
-            direction,
-            target: None,
-            radiance: self.radiance(p, wavelengths),
-            pdf: Self::per_solid_angle(density, sine),
-            delta: false,
-        })
+        block::single_sample(self, from, u, wavelengths)
     }
 
     fn is_environment(&self) -> bool {
@@ -166,15 +211,15 @@ impl<C: ColorModel> Emitter<C> for Envmap<C> {
     }
 
     fn environment_radiance(&self, direction: Vec3, wavelengths: &C::Wavelengths) -> C::Sample {
-        self.radiance(self.point(direction), wavelengths)
+        self.radiance(self.point::<f32>(direction.into()).into(), wavelengths)
     }
 
     fn environment_pdf(&self, direction: Vec3) -> f32 {
         let Some(cells) = &self.cells else {
             return 0.0;
         };
-        let p = self.point(direction);
-        Self::per_solid_angle(cells.pdf(p), (PI * p.y).sin())
+        let p = Vec2::from(self.point::<f32>(direction.into()));
+        Self::per_solid_angle(cells.pdf(p), lanes::sin_cos(PI * p.y).0)
     }
 
     fn power(&self, _color: &C, radius: f64) -> f64 {

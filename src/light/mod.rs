@@ -2,6 +2,7 @@
 
 mod ambient;
 mod area;
+mod block;
 mod brightness;
 mod constant;
 mod directional;
@@ -23,6 +24,8 @@ use crate::interaction::Interaction;
 use crate::math::{Frame, Transform};
 use crate::shape::{Geometry, SurfaceSample};
 use crate::texture::{Palettes, Texture};
+
+pub use block::LightSamples;
 
 /// A direction drawn toward a light.
 #[derive(Clone, Copy, Debug)]

@@ -7,7 +7,8 @@ use crate::color::{Rgb, Samples};
 use crate::description::{Description, Kind, Options};
 use crate::image::{self, Image, Metadata};
 use crate::interaction::{Hit, Ray};
-use crate::math::{random, warp};
+use crate::lanes::warp;
+use crate::math::random;
 use crate::shape::Geometry;
 
 /// Images in a folder of their own.
@@ -135,7 +136,7 @@ fn every_environment_is_drawn_with_the_density_that_it_says_and_missed_nowhere()
             // Rounding may carry a direction at the border of a cell into the next.
             strays += u32::from((pdf / sample.pdf - 1.0).abs() > 1e-3);
             drawn += f64::from(sample.radiance.0[0] / sample.pdf);
-            let direction = warp::uniform_sphere(point(2, i));
+            let direction = Vec3::from(warp::uniform_sphere(point(2, i).into()));
             let radiance = light.environment_radiance(direction, &());
             assert!(radiance.is_black() || light.environment_pdf(direction) > 0.0);
             uniform += f64::from(radiance.0[0]) * 4.0 * std::f64::consts::PI;

@@ -1,15 +1,14 @@
 //! `conductor`: a polished metal. `material` names one of the table, or `eta` and `k` give its index of
 //! refraction; without either it is a perfect mirror. `specular_reflectance` (1) multiplies.
 
-use glam::{Vec2, Vec3};
-
 use super::ior::Complex;
-use super::{Bsdf, BsdfSample, Lobes, fresnel};
+use super::{BlockBsdf, Bsdf, BsdfSamples, BsdfValues, Lobes, fresnel, single_face};
 use crate::color::{ColorModel, Role};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, texture};
 use crate::error::Result;
-use crate::interaction::Interaction;
+use crate::interaction::Points;
+use crate::lanes::{Lanes, Vec2, Vec3};
 use crate::texture::{Palettes, Texture};
 
 /// A metallic mirror.
@@ -49,21 +48,33 @@ impl<C: ColorModel> Bsdf<C> for Conductor<C> {
         Lobes::MIRROR
     }
 
-    fn sample(
+    single_face!();
+}
+
+impl<C: ColorModel> BlockBsdf<C> for Conductor<C> {
+    #[inline(always)]
+    fn eval_lanes<F: Lanes>(
         &self,
-        at: &Interaction<'_>,
-        wi: Vec3,
-        _u1: f32,
-        _u2: Vec2,
-        w: &C::Wavelengths,
-    ) -> Option<BsdfSample<C::Sample>> {
-        (wi.z > 0.0).then(|| BsdfSample {
-            wo: fresnel::mirror(wi),
-            weight: self.index.fresnel(at, wi.z, w) * self.specular_reflectance.eval(at, w),
-            pdf: 1.0,
-            eta: 1.0,
-            delta: true,
-            null: false,
-        })
+        _at: &Points<'_, F>,
+        _wi: Vec3<F>,
+        _wo: Vec3<F>,
+        _w: &[C::Wavelengths],
+    ) -> BsdfValues<F, C::Columns<F>> {
+        BsdfValues::none()
+    }
+
+    #[inline(always)]
+    fn sample_lanes<F: Lanes>(
+        &self,
+        at: &Points<'_, F>,
+        wi: Vec3<F>,
+        _u1: F,
+        _u2: Vec2<F>,
+        w: &[C::Wavelengths],
+    ) -> BsdfSamples<F, C::Columns<F>> {
+        let factor = self.specular_reflectance.eval_lanes(at, w);
+        let weight = self.index.fresnel(at, wi.z, w) * factor;
+        let seen = F::zero().lt(wi.z);
+        BsdfSamples::delta(seen, fresnel::mirror(wi), weight, F::one())
     }
 }

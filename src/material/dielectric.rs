@@ -2,14 +2,13 @@
 //! (`ext_ior`). It reflects the Fresnel share and refracts the rest, whose radiance changes by 1/η².
 //! `specular_reflectance` and `specular_transmittance` (1) multiply.
 
-use glam::{Vec2, Vec3};
-
-use super::{Bsdf, BsdfSample, Lobes, fresnel, ior};
+use super::{BlockBsdf, Bsdf, BsdfSamples, BsdfValues, Lobes, fresnel, ior, single_face};
 use crate::color::{ColorModel, Role};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, Row, texture};
 use crate::error::Result;
-use crate::interaction::Interaction;
+use crate::interaction::Points;
+use crate::lanes::{Lanes, Mask as _, Vec2, Vec3};
 use crate::texture::{Palettes, Texture};
 
 /// A clear boundary.
@@ -67,33 +66,49 @@ impl<C: ColorModel> Bsdf<C> for Dielectric<C> {
         }
     }
 
-    fn sample(
+    single_face!();
+}
+
+impl<C: ColorModel> BlockBsdf<C> for Dielectric<C> {
+    #[inline(always)]
+    fn eval_lanes<F: Lanes>(
         &self,
-        at: &Interaction<'_>,
-        wi: Vec3,
-        u1: f32,
-        _u2: Vec2,
-        w: &C::Wavelengths,
-    ) -> Option<BsdfSample<C::Sample>> {
+        _at: &Points<'_, F>,
+        _wi: Vec3<F>,
+        _wo: Vec3<F>,
+        _w: &[C::Wavelengths],
+    ) -> BsdfValues<F, C::Columns<F>> {
+        BsdfValues::none()
+    }
+
+    #[inline(always)]
+    fn sample_lanes<F: Lanes>(
+        &self,
+        at: &Points<'_, F>,
+        wi: Vec3<F>,
+        u1: F,
+        _u2: Vec2<F>,
+        w: &[C::Wavelengths],
+    ) -> BsdfSamples<F, C::Columns<F>> {
         let boundary = fresnel::dielectric(wi.z, self.eta);
-        Some(if u1 < boundary.reflectance {
-            BsdfSample {
-                wo: fresnel::mirror(wi),
-                weight: self.specular_reflectance.eval(at, w),
-                pdf: boundary.reflectance,
-                eta: 1.0,
-                delta: true,
-                null: false,
-            }
-        } else {
-            BsdfSample {
-                wo: fresnel::refract(wi, Vec3::Z, &boundary),
-                weight: self.specular_transmittance.eval(at, w) / (boundary.eta * boundary.eta),
-                pdf: 1.0 - boundary.reflectance,
-                eta: boundary.eta,
-                delta: true,
-                null: false,
-            }
-        })
+        let all = F::Mask::splat(true);
+        let reflected = BsdfSamples::delta(
+            all,
+            fresnel::mirror(wi),
+            self.specular_reflectance.eval_lanes(at, w),
+            boundary.reflectance,
+        );
+        let normal = Vec3::all(glam::Vec3::Z);
+        let spread = F::one() / (boundary.eta * boundary.eta);
+        let refracted = BsdfSamples {
+            eta: boundary.eta,
+            ..BsdfSamples::delta(
+                all,
+                fresnel::refract(wi, normal, &boundary),
+                self.specular_transmittance.eval_lanes(at, w) * spread,
+                F::one() - boundary.reflectance,
+            )
+        };
+        BsdfSamples::select(u1.lt(boundary.reflectance), reflected, refracted)
     }
 }

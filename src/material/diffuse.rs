@@ -1,16 +1,12 @@
 //! `diffuse`: Lambert's law, f = reflectance / π on the front side; `reflectance` 0.5 by default.
 
-use std::f32::consts::FRAC_1_PI;
-
-use glam::{Vec2, Vec3};
-
-use super::{Bsdf, BsdfSample, BsdfValue, Lobes, PhongTerms};
-use crate::color::{Color, ColorModel, Role, Spectral};
+use super::{BlockBsdf, Bsdf, BsdfSamples, BsdfValues, Lobes, PhongTerms, single_face};
+use crate::color::{Color, ColorModel, Role, Spectra, Spectral};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, texture};
 use crate::error::Result;
-use crate::interaction::Interaction;
-use crate::math::warp;
+use crate::interaction::{Interaction, Points};
+use crate::lanes::{Lanes, Vec2, Vec3, warp};
 use crate::texture::{Palettes, Texture};
 
 /// An ideal matte surface.
@@ -48,50 +44,58 @@ impl<C: ColorModel> Diffuse<C> {
     }
 }
 
+impl<C: ColorModel> BlockBsdf<C> for Diffuse<C> {
+    #[inline(always)]
+    fn eval_lanes<F: Lanes>(
+        &self,
+        at: &Points<'_, F>,
+        wi: Vec3<F>,
+        wo: Vec3<F>,
+        w: &[C::Wavelengths],
+    ) -> BsdfValues<F, C::Columns<F>> {
+        let seen = F::zero().lt(wi.z) & F::zero().lt(wo.z);
+        let pdf = warp::cosine_hemisphere_pdf(wo.z);
+        let value = self.reflectance.eval_lanes(at, w) * pdf;
+        BsdfValues { value, pdf }.only(seen)
+    }
+
+    #[inline(always)]
+    fn sample_lanes<F: Lanes>(
+        &self,
+        at: &Points<'_, F>,
+        wi: Vec3<F>,
+        _u1: F,
+        u2: Vec2<F>,
+        w: &[C::Wavelengths],
+    ) -> BsdfSamples<F, C::Columns<F>> {
+        let wo = warp::cosine_hemisphere(u2);
+        let pdf = warp::cosine_hemisphere_pdf(wo.z);
+        let weight = self.reflectance.eval_lanes(at, w);
+        let values = BsdfValues {
+            value: weight * pdf,
+            pdf,
+        };
+        let samples = values.as_samples(wo, F::one());
+        BsdfSamples {
+            drawn: samples.drawn & F::zero().lt(wi.z) & !weight.is_black(),
+            weight,
+            ..samples
+        }
+    }
+}
+
 impl<C: ColorModel> Bsdf<C> for Diffuse<C> {
     fn lobes(&self) -> Lobes {
         Lobes::REFLECTION
     }
 
-    fn eval(
-        &self,
-        at: &Interaction<'_>,
-        wi: Vec3,
-        wo: Vec3,
-        w: &C::Wavelengths,
-    ) -> Option<BsdfValue<C::Sample>> {
-        (wi.z > 0.0 && wo.z > 0.0).then(|| BsdfValue {
-            value: self.reflectance.eval(at, w) * (FRAC_1_PI * wo.z),
-            pdf: warp::cosine_hemisphere_pdf(wo.z),
-        })
-    }
-
-    fn sample(
-        &self,
-        at: &Interaction<'_>,
-        wi: Vec3,
-        _u1: f32,
-        u2: Vec2,
-        w: &C::Wavelengths,
-    ) -> Option<BsdfSample<C::Sample>> {
-        let wo = warp::cosine_hemisphere(u2);
-        let pdf = warp::cosine_hemisphere_pdf(wo.z);
-        let weight = self.reflectance.eval(at, w);
-        (wi.z > 0.0 && pdf > 0.0 && !weight.is_black()).then_some(BsdfSample {
-            wo,
-            weight,
-            pdf,
-            eta: 1.0,
-            delta: false,
-            null: false,
-        })
-    }
+    single_face!();
 
     fn phong(
         &self,
         at: &Interaction<'_>,
-        wi: Vec3,
-        wo: Vec3,
+        wi: glam::Vec3,
+        wo: glam::Vec3,
         w: &C::Wavelengths,
     ) -> Option<PhongTerms<C::Sample>> {
         (wi.z > 0.0 && wo.z > 0.0).then(|| PhongTerms {

@@ -131,7 +131,7 @@ pub(super) struct Point<S> {
 
 impl<S: Spectral> Point<S> {
     /// The facets of the main specular lobes, with the roughness times `factor`.
-    pub(super) fn distribution(&self, factor: f32) -> Distribution {
+    pub(super) fn distribution(&self, factor: f32) -> Distribution<f32> {
         const KIND: Kind = Kind {
             shape: Shape::Ggx,
             sample_visible: true,

@@ -7,7 +7,8 @@ use crate::color::{Color, ColorModel, Role};
 use crate::description::declared::{Row, string, substance, texture};
 use crate::description::{Properties, Value};
 use crate::error::{Error, Result};
-use crate::interaction::Interaction;
+use crate::interaction::Points;
+use crate::lanes::Lanes;
 use crate::texture::{Palettes, Texture};
 
 /// Substances by name and index.
@@ -140,13 +141,14 @@ impl<C: ColorModel> Complex<C> {
 
 impl<C: ColorModel> Complex<C> {
     /// Fresnel's reflectance at the cosine `cos_i`.
-    pub(super) fn fresnel(
+    #[inline(always)]
+    pub(super) fn fresnel<F: Lanes>(
         &self,
-        at: &Interaction<'_>,
-        cos_i: f32,
-        w: &C::Wavelengths,
-    ) -> C::Sample {
-        fresnel::conductor(cos_i, self.eta.eval(at, w), self.k.eval(at, w))
+        at: &Points<'_, F>,
+        cos_i: F,
+        w: &[C::Wavelengths],
+    ) -> C::Columns<F> {
+        fresnel::conductor(cos_i, self.eta.eval_lanes(at, w), self.k.eval_lanes(at, w))
     }
 }
 

@@ -1,13 +1,15 @@
 //! `mask`: the nested material with probability `opacity` (0.5; clamped to [0, 1]), nothing otherwise.
 
-use glam::{Vec2, Vec3};
-
-use super::{Bsdf, BsdfSample, BsdfValue, Lobes, Material, PhongTerms, fraction, nested};
-use crate::color::{ColorModel, Mono, Spectral};
+use super::{
+    BlockBsdf, Bsdf, BsdfSamples, BsdfValues, Lobes, Material, PhongTerms, fraction, nested,
+    single_face,
+};
+use crate::color::{ColorModel, Mono, Spectra};
 use crate::description::declared::{Plugin, nested as nested_row, number};
 use crate::description::{Kind, Properties};
 use crate::error::Result;
-use crate::interaction::Interaction;
+use crate::interaction::{Interaction, Points};
+use crate::lanes::{Lanes, Mask as _, Vec2, Vec3};
 use crate::texture::{Palettes, Texture};
 
 /// A material with holes.
@@ -47,53 +49,62 @@ impl<C: ColorModel> Bsdf<C> for Mask<C> {
         }
     }
 
-    fn eval(
-        &self,
-        at: &Interaction<'_>,
-        wi: Vec3,
-        wo: Vec3,
-        w: &C::Wavelengths,
-    ) -> Option<BsdfValue<C::Sample>> {
-        let opacity = fraction(&self.opacity, at);
-        let value = self.nested.eval(at, wi, wo, w)?;
-        Some(BsdfValue {
-            value: value.value * opacity,
-            pdf: value.pdf * opacity,
-        })
-    }
-
-    fn sample(
-        &self,
-        at: &Interaction<'_>,
-        wi: Vec3,
-        u1: f32,
-        u2: Vec2,
-        w: &C::Wavelengths,
-    ) -> Option<BsdfSample<C::Sample>> {
-        let opacity = fraction(&self.opacity, at);
-        if u1 >= opacity {
-            let one = C::Sample::splat(1.0);
-            return Some(BsdfSample::passing(wi, 1.0 - opacity, one));
-        }
-        let sample = self.nested.sample(at, wi, u1 / opacity, u2, w)?;
-        Some(BsdfSample {
-            pdf: sample.pdf * opacity,
-            ..sample
-        })
-    }
+    single_face!();
 
     fn phong(
         &self,
         at: &Interaction<'_>,
-        wi: Vec3,
-        wo: Vec3,
+        wi: glam::Vec3,
+        wo: glam::Vec3,
         w: &C::Wavelengths,
     ) -> Option<PhongTerms<C::Sample>> {
         let terms = self.nested.phong(at, wi, wo, w)?;
         Some(terms.weighted(fraction(&self.opacity, at)))
     }
 
-    fn ambient(&self, at: &Interaction<'_>, wi: Vec3, w: &C::Wavelengths) -> C::Sample {
+    fn ambient(&self, at: &Interaction<'_>, wi: glam::Vec3, w: &C::Wavelengths) -> C::Sample {
         self.nested.ambient(at, wi, w) * fraction(&self.opacity, at)
+    }
+}
+
+impl<C: ColorModel> BlockBsdf<C> for Mask<C> {
+    #[inline(always)]
+    fn eval_lanes<F: Lanes>(
+        &self,
+        at: &Points<'_, F>,
+        wi: Vec3<F>,
+        wo: Vec3<F>,
+        w: &[C::Wavelengths],
+    ) -> BsdfValues<F, C::Columns<F>> {
+        let opacity = self.opacity.numbers(at).clamp(0.0, 1.0);
+        let values = self.nested.eval_lanes(at, wi, wo, w);
+        BsdfValues {
+            value: values.value * opacity,
+            pdf: values.pdf * opacity,
+        }
+    }
+
+    #[inline(always)]
+    fn sample_lanes<F: Lanes>(
+        &self,
+        at: &Points<'_, F>,
+        wi: Vec3<F>,
+        u1: F,
+        u2: Vec2<F>,
+        w: &[C::Wavelengths],
+    ) -> BsdfSamples<F, C::Columns<F>> {
+        let opacity = self.opacity.numbers(at).clamp(0.0, 1.0);
+        let met = u1.lt(opacity);
+        let one = C::Columns::<F>::splat(F::one());
+        let passing = BsdfSamples::passing(wi, F::one() - opacity, one);
+        if !(met & at.active).any() {
+            return passing;
+        }
+        let nested = self.nested.sample_lanes(at, wi, u1 / opacity, u2, w);
+        let nested = BsdfSamples {
+            pdf: nested.pdf * opacity,
+            ..nested
+        };
+        BsdfSamples::select(met, nested, passing)
     }
 }

@@ -6,17 +6,14 @@
 //! exact sampling routine*, 2017; Beckmann by Jakob, *An improved visible normal sampling routine*, 2014)
 //! or by their area alone.
 
-use std::f32::consts::{FRAC_1_PI, PI, TAU};
-
-use glam::{Vec2, Vec3};
+use std::f32::consts::{FRAC_1_PI, PI};
 
 use crate::color::Mono;
 use crate::description::Properties;
 use crate::description::declared::{Row, boolean, choice, number};
 use crate::error::Result;
-use crate::interaction::Interaction;
-use crate::math::erf::{erf, erf_inverse};
-use crate::math::warp;
+use crate::interaction::{Interaction, Points};
+use crate::lanes::{Lanes, Vec2, Vec3, erf, erf_inverse, exp, ln, sin_cos_turns, warp};
 use crate::texture::{Palette, Texture};
 
 /// Which distribution.
@@ -106,9 +103,20 @@ impl Roughness {
         })
     }
 
-    pub(super) fn at(&self, at: &Interaction<'_>) -> Distribution {
+    pub(super) fn at(&self, at: &Interaction<'_>) -> Distribution<f32> {
         let u = self.alpha_u.eval(at, &())[0];
         let v = self.alpha_v.as_ref().map_or(u, |v| v.eval(at, &())[0]);
+        Distribution::new(self.kind, u, v)
+    }
+
+    /// The same at points in lanes.
+    #[inline(always)]
+    pub(super) fn at_lanes<F: Lanes>(&self, at: &Points<'_, F>) -> Distribution<F> {
+        let u = self.alpha_u.numbers(at);
+        let v = match &self.alpha_v {
+            Some(v) => v.numbers(at),
+            None => u,
+        };
         Distribution::new(self.kind, u, v)
     }
 }
@@ -116,25 +124,28 @@ impl Roughness {
 /// Roughness where a scene gives none.
 pub(super) const DEFAULT_ALPHA: f64 = 0.1;
 
-/// The distribution at one point.
+/// The distribution at points.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Distribution {
+pub(super) struct Distribution<F> {
     kind: Kind,
-    alpha: Vec2,
+    alpha: Vec2<F>,
 }
 
-impl Distribution {
+impl<F: Lanes> Distribution<F> {
     /// Roughness along the tangents, at least 10⁻⁴ each.
-    pub(super) fn new(kind: Kind, alpha_u: f32, alpha_v: f32) -> Self {
+    #[inline(always)]
+    pub(super) fn new(kind: Kind, alpha_u: F, alpha_v: F) -> Self {
+        let least = F::splat(1e-4);
         Self {
             kind,
-            alpha: Vec2::new(alpha_u, alpha_v).max(Vec2::splat(1e-4)),
+            alpha: Vec2::new(alpha_u.max(least), alpha_v.max(least)),
         }
     }
 
     /// The same with its roughness multiplied.
     #[must_use]
-    pub(super) fn scaled(self, factor: f32) -> Self {
+    #[inline(always)]
+    pub(super) fn scaled(self, factor: F) -> Self {
         Self {
             alpha: self.alpha * factor,
             ..self
@@ -147,49 +158,50 @@ impl Distribution {
     }
 
     /// D(m): facet area per solid angle of normals and unit of surface.
-    pub(super) fn eval(&self, m: Vec3) -> f32 {
-        let slope2 = (m.truncate() / self.alpha).length_squared();
-        let scale = FRAC_1_PI / (self.alpha.x * self.alpha.y);
+    #[inline(always)]
+    pub(super) fn eval(&self, m: Vec3<F>) -> F {
+        let (x, y) = (m.x / self.alpha.x, m.y / self.alpha.y);
+        let slope2 = x * x + y * y;
+        let scale = F::splat(FRAC_1_PI) / (self.alpha.x * self.alpha.y);
         let cos2 = m.z * m.z;
         let d = match self.kind.shape {
-            Shape::Beckmann => scale * (-slope2 / cos2).exp() / (cos2 * cos2),
-            Shape::Ggx => scale / (slope2 + cos2).powi(2),
+            Shape::Beckmann => scale * exp(-slope2 / cos2) / (cos2 * cos2),
+            Shape::Ggx => scale / (slope2 + cos2).squared(),
         };
-        // Also false for NaN: facets on edge, of which there are none.
-        if d * m.z > 1e-20 { d } else { 0.0 }
+        // Also false for what is no number: facets on edge, of which there are none.
+        F::select(F::splat(1e-20).lt(d * m.z), d, F::zero())
     }
 
     /// Smith's masking: the share of facets with normal `m` that `v` sees.
-    pub(super) fn g1(&self, v: Vec3, m: Vec3) -> f32 {
-        if v.dot(m) * v.z <= 0.0 {
-            return 0.0; // the back of a facet is not seen from the front
-        }
-        let xy2 = (v.truncate() * self.alpha).length_squared();
-        if xy2 == 0.0 {
-            return 1.0;
-        }
+    #[inline(always)]
+    pub(super) fn g1(&self, v: Vec3<F>, m: Vec3<F>) -> F {
+        let (zero, one) = (F::zero(), F::one());
+        let xy2 = v.xy().times(self.alpha).length_squared();
         let tan2 = xy2 / (v.z * v.z);
-        match self.kind.shape {
+        let share = match self.kind.shape {
             Shape::Beckmann => {
-                let a = 1.0 / tan2.sqrt();
-                if a >= 1.6 {
-                    1.0
-                } else {
-                    // Walter's rational fit, within 0.35 %.
-                    (3.535 * a + 2.181 * a * a) / (1.0 + 2.276 * a + 2.577 * a * a)
-                }
+                let a = one / tan2.sqrt();
+                // Walter's rational fit, within 0.35 %.
+                let fit = (F::splat(3.535) * a + F::splat(2.181) * a * a)
+                    / (one + F::splat(2.276) * a + F::splat(2.577) * a * a);
+                F::select(F::splat(1.6).le(a), one, fit)
             }
-            Shape::Ggx => 2.0 / (1.0 + (1.0 + tan2).sqrt()),
-        }
+            Shape::Ggx => F::splat(2.0) / (one + (one + tan2).sqrt()),
+        };
+        let share = F::select(xy2.eq(zero), one, share);
+        // The back of a facet is not seen from the front.
+        F::select(zero.lt(v.dot(m) * v.z), share, zero)
     }
 
     /// The share of facets seen from both.
-    pub(super) fn g(&self, wi: Vec3, wo: Vec3, m: Vec3) -> f32 {
+    #[inline(always)]
+    pub(super) fn g(&self, wi: Vec3<F>, wo: Vec3<F>, m: Vec3<F>) -> F {
         self.g1(wi, m) * self.g1(wo, m)
     }
 
     /// The density of [`Self::sample`]; `wi` is on the front side.
-    pub(super) fn pdf(&self, wi: Vec3, m: Vec3) -> f32 {
+    #[inline(always)]
+    pub(super) fn pdf(&self, wi: Vec3<F>, m: Vec3<F>) -> F {
         let d = self.eval(m);
         if self.kind.sample_visible {
             d * self.g1(wi, m) * wi.dot(m).abs() / wi.z
@@ -199,7 +211,8 @@ impl Distribution {
     }
 
     /// Draws the normal, on the front side, of a facet for `wi`, which is there too.
-    pub(super) fn sample(&self, wi: Vec3, u: Vec2) -> Vec3 {
+    #[inline(always)]
+    pub(super) fn sample(&self, wi: Vec3<F>, u: Vec2<F>) -> Vec3<F> {
         if self.kind.sample_visible {
             self.visible(wi, u)
         } else {
@@ -208,63 +221,80 @@ impl Distribution {
     }
 
     /// A facet by its area projected on the surface.
-    fn any(&self, u: Vec2) -> Vec3 {
+    #[inline(always)]
+    fn any(&self, u: Vec2<F>) -> Vec3<F> {
         // tan² θ for roughness 1, then stretched.
+        let rest = F::one() - u.x;
         let tan2 = match self.kind.shape {
-            Shape::Beckmann => -(1.0 - u.x).ln(),
-            Shape::Ggx => u.x / (1.0 - u.x),
+            Shape::Beckmann => -ln(rest),
+            Shape::Ggx => u.x / rest,
         };
-        let (sin, cos) = (TAU * u.y).sin_cos();
-        let slope = tan2.sqrt() * self.alpha * Vec2::new(cos, sin);
-        slope.extend(1.0).normalize()
+        let (sin, cos) = sin_cos_turns(u.y);
+        let slope = self.alpha.times(Vec2::new(cos, sin)) * tan2.max(F::zero()).sqrt();
+        slope.extend(F::one()).normalize()
     }
 
     /// A facet by its area projected on `wi`: stretched so that the roughness is 1, drawn there, and
     /// stretched back.
-    fn visible(&self, wi: Vec3, u: Vec2) -> Vec3 {
-        let stretched = (wi.truncate() * self.alpha).extend(wi.z).normalize();
-        let sin2 = stretched.truncate().length_squared();
-        let turn = if sin2 > 1e-14 {
-            stretched.truncate() / sin2.sqrt()
-        } else {
-            Vec2::X
-        };
+    #[inline(always)]
+    fn visible(&self, wi: Vec3<F>, u: Vec2<F>) -> Vec3<F> {
+        let stretched = wi.xy().times(self.alpha).extend(wi.z).normalize();
+        let sin2 = stretched.xy().length_squared();
+        let told = F::splat(1e-14).lt(sin2);
+        let turn = stretched.xy() / sin2.sqrt();
+        let turn = Vec2::select(told, turn, Vec2::new(F::one(), F::zero()));
         let slope = match self.kind.shape {
             Shape::Beckmann => beckmann_slope(stretched.z, u),
             Shape::Ggx => ggx_slope(stretched.z, u),
         };
-        let slope = turn.rotate(slope) * self.alpha;
-        Vec3::new(-slope.x, -slope.y, 1.0).normalize()
+        let x = turn.x * slope.x - turn.y * slope.y;
+        let y = turn.y * slope.x + turn.x * slope.y;
+        Vec3::new(-(x * self.alpha.x), -(y * self.alpha.y), F::one()).normalize()
+    }
+}
+
+impl Distribution<f32> {
+    /// The same in all lanes.
+    #[inline(always)]
+    pub(super) fn all<F: Lanes>(&self) -> Distribution<F> {
+        Distribution {
+            kind: self.kind,
+            alpha: Vec2::all(self.alpha.into()),
+        }
     }
 }
 
 /// A slope seen at the angle with that cosine in the plane x = 0, of Beckmann's distribution with
 /// roughness 1: the inverse of the cumulative distribution, in the domain of erf, by Newton's method.
-fn beckmann_slope(cos: f32, u: Vec2) -> Vec2 {
-    let tan = (1.0 - cos * cos).max(0.0).sqrt() / cos;
-    let cot = 1.0 / tan;
+#[inline(always)]
+fn beckmann_slope<F: Lanes>(cos: F, u: Vec2<F>) -> Vec2<F> {
+    let one = F::one();
+    let tan = (one - cos * cos).max(F::zero()).sqrt() / cos;
+    let cot = one / tan;
     let limit = erf(cot);
-    let u = u.clamp(Vec2::splat(1e-6), Vec2::splat(1.0 - 1e-6));
+    let (ux, uy) = (u.x.clamp(1e-6, 1.0 - 1e-6), u.y.clamp(1e-6, 1.0 - 1e-6));
     // Exact at grazing incidence, where the function is least linear.
-    let mut x = limit - (limit + 1.0) * erf((-u.x.ln()).sqrt());
-    let root = 1.0 / PI.sqrt();
-    let target = u.x * (1.0 + limit + root * tan * (-cot * cot).exp());
+    let mut x = limit - (limit + one) * erf((-ln(ux)).sqrt());
+    let root = F::splat(1.0 / PI.sqrt()) * tan;
+    let target = ux * (one + limit + root * exp(-cot * cot));
     for _ in 0..3 {
         let slope = erf_inverse(x);
-        let value = 1.0 + x + root * tan * (-slope * slope).exp() - target;
-        x -= value / (1.0 - slope * tan);
+        let value = one + x + root * exp(-slope * slope) - target;
+        x = x - value / (one - slope * tan);
     }
-    Vec2::new(erf_inverse(x), erf_inverse(2.0 * u.y - 1.0))
+    Vec2::new(erf_inverse(x), erf_inverse(uy + uy - one))
 }
 
 /// The same of GGX: a point on the facets' hemisphere, projected along the view on a disc.
-fn ggx_slope(cos: f32, u: Vec2) -> Vec2 {
+#[inline(always)]
+fn ggx_slope<F: Lanes>(cos: F, u: Vec2<F>) -> Vec2<F> {
+    let (zero, one) = (F::zero(), F::one());
     let p = warp::concentric_disk(u);
-    let s = 0.5 * (1.0 + cos);
-    let edge = (1.0 - p.x * p.x).max(0.0).sqrt();
+    let s = F::splat(0.5) * (one + cos);
+    let edge = (one - p.x * p.x).max(zero).sqrt();
     let y = edge + (p.y - edge) * s;
-    let z = (1.0 - p.x * p.x - y * y).max(0.0).sqrt();
-    let sin = (1.0 - cos * cos).max(0.0).sqrt();
+    let z = (one - p.x * p.x - y * y).max(zero).sqrt();
+    let sin = (one - cos * cos).max(zero).sqrt();
     Vec2::new(cos * y - sin * z, p.x) / (sin * y + cos * z)
 }
 
@@ -272,7 +302,7 @@ fn ggx_slope(cos: f32, u: Vec2) -> Vec2 {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Interface {
     /// Its normal, on the front side.
-    pub(super) m: Vec3,
+    pub(super) m: glam::Vec3,
     /// Whether both directions are on the same side.
     pub(super) reflection: bool,
     /// Index of refraction on the side of `wo` over that on the side of `wi`.
@@ -284,7 +314,7 @@ pub(super) struct Interface {
 impl Interface {
     /// Of a boundary whose index is `eta` inside over outside; `None` where no facet seen from both does
     /// it.
-    pub(super) fn between(wi: Vec3, wo: Vec3, eta: f32) -> Option<Self> {
+    pub(super) fn between(wi: glam::Vec3, wo: glam::Vec3, eta: f32) -> Option<Self> {
         let reflection = wi.z * wo.z > 0.0;
         let eta = match (reflection, wi.z > 0.0) {
             (true, _) => 1.0,
@@ -311,9 +341,13 @@ impl Interface {
 
 #[cfg(test)]
 mod tests {
+    use std::f32::consts::TAU;
+
+    use glam::{Vec2, Vec3};
+
     use super::*;
 
-    fn distributions() -> impl Iterator<Item = Distribution> {
+    fn distributions() -> impl Iterator<Item = Distribution<f32>> {
         [Shape::Beckmann, Shape::Ggx].into_iter().flat_map(|shape| {
             [(0.1, 0.1), (0.5, 0.2), (1.0, 1.0)]
                 .into_iter()
@@ -350,12 +384,13 @@ mod tests {
     fn facets_cover_the_surface_and_densities_integrate_to_one() {
         let wi = Vec3::new(0.6, -0.36, 0.714_142_84);
         for d in distributions() {
-            let area = integral(|m| d.eval(m) * m.z);
+            let area = integral(|m| d.eval(m.into()) * m.z);
             assert!((area - 1.0).abs() < 2e-3, "{d:?}: {area}");
-            let pdf = integral(|m| d.pdf(wi, m));
+            let pdf = integral(|m| d.pdf(wi.into(), m.into()));
             // Beckmann's masking is a fit.
             assert!((pdf - 1.0).abs() < 5e-3, "{d:?}: {pdf}");
-            let seen = integral(|m| d.eval(m) * d.g1(wi, m) * wi.dot(m).max(0.0));
+            let seen =
+                integral(|m| d.eval(m.into()) * d.g1(wi.into(), m.into()) * wi.dot(m).max(0.0));
             assert!((seen / f64::from(wi.z) - 1.0).abs() < 5e-3, "{d:?}: {seen}");
         }
     }
@@ -366,12 +401,12 @@ mod tests {
         for d in distributions() {
             // cos θ, for slopes of long-tailed distributions have no finite variance.
             for f in [|m: Vec3| m.z, |m: Vec3| m.x, |m: Vec3| m.y * m.y] {
-                let expected = integral(|m| f(m) * d.pdf(wi, m));
+                let expected = integral(|m| f(m) * d.pdf(wi.into(), m.into()));
                 let n = 300;
                 let mut mean = 0.0;
                 for i in 0..n * n {
                     let u = Vec2::new((i / n) as f32 + 0.5, (i % n) as f32 + 0.5) / n as f32;
-                    let m = d.sample(wi, u);
+                    let m = Vec3::from(d.sample(wi.into(), u.into()));
                     assert!(m.is_normalized() && m.z > 0.0);
                     mean += f64::from(f(m)) / f64::from(n * n);
                 }

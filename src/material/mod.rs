@@ -20,6 +20,7 @@ mod roughplastic;
 mod thindielectric;
 mod twosided;
 
+mod block;
 mod disney;
 mod fresnel;
 mod ior;
@@ -34,6 +35,9 @@ use crate::error::Result;
 use crate::family::family;
 use crate::interaction::Interaction;
 use crate::texture::{Palettes, Texture};
+
+use block::{BlockBsdf, single_face};
+pub use block::{BsdfSamples, BsdfValues};
 
 /// A direction drawn from a BSDF.
 #[derive(Clone, Copy, Debug)]

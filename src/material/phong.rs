@@ -17,7 +17,8 @@ use crate::description::Properties;
 use crate::description::declared::{Plugin, number, texture};
 use crate::error::Result;
 use crate::interaction::Interaction;
-use crate::math::{Frame, warp};
+use crate::lanes::warp;
+use crate::math::Frame;
 use crate::texture::{Palettes, Texture};
 
 /// A matte base and a cosine-power highlight.
@@ -81,7 +82,7 @@ impl<C: ColorModel> Phong<C> {
 
 /// max(0, R·V)ⁿ, the same whichever of the two directions is the light's.
 fn lobe(wi: Vec3, wo: Vec3, exponent: f32) -> f32 {
-    let cosine = fresnel::mirror(wi).dot(wo);
+    let cosine = Vec3::from(fresnel::mirror::<f32>(wi.into())).dot(wo);
     if cosine > 0.0 {
         cosine.min(1.0).powf(exponent)
     } else {
@@ -127,10 +128,10 @@ impl<C: ColorModel> Bsdf<C> for Phong<C> {
             let cosine = (1.0 - u2.x).powf(1.0 / (self.exponent(at) + 1.0));
             let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
             let (y, x) = (TAU * u2.y).sin_cos();
-            let around = Frame::around(fresnel::mirror(wi));
+            let around = Frame::around(fresnel::mirror::<f32>(wi.into()).into());
             around.to_world(Vec3::new(x * sine, y * sine, cosine))
         } else {
-            warp::cosine_hemisphere(u2)
+            Vec3::from(warp::cosine_hemisphere(u2.into()))
         };
         self.eval(at, wi, wo, w)?.as_sample(wo, 1.0)
     }

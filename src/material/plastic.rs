@@ -6,15 +6,13 @@
 
 use std::f32::consts::FRAC_1_PI;
 
-use glam::{Vec2, Vec3};
-
-use super::{Bsdf, BsdfSample, BsdfValue, Lobes, fresnel, ior, mean};
-use crate::color::{ColorModel, Role, Spectral};
+use super::{BlockBsdf, Bsdf, BsdfSamples, BsdfValues, Lobes, fresnel, ior, mean, single_face};
+use crate::color::{ColorModel, Role, Spectra};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, Row, boolean, texture};
 use crate::error::Result;
-use crate::interaction::Interaction;
-use crate::math::warp;
+use crate::interaction::Points;
+use crate::lanes::{Lanes, Vec2, Vec3, warp};
 use crate::texture::{Palettes, Texture};
 
 /// A matte base under a smooth coat.
@@ -71,19 +69,24 @@ impl<C: ColorModel> Base<C> {
     }
 
     /// f·cos θ_o where the coat lets the shares `t_i` and `t_o` pass on the way in and out.
-    pub(super) fn eval(
+    #[inline(always)]
+    pub(super) fn eval<F: Lanes>(
         &self,
-        at: &Interaction<'_>,
-        t_i: f32,
-        t_o: f32,
-        cos_o: f32,
-        w: &C::Wavelengths,
-    ) -> C::Sample {
-        let scale = FRAC_1_PI * cos_o * t_i * t_o / (self.eta * self.eta);
-        self.diffuse_reflectance.eval(at, w).map(|diffuse| {
-            let again = if self.nonlinear { diffuse } else { 1.0 };
-            scale * diffuse / (1.0 - again * self.internal_reflectance)
-        })
+        at: &Points<'_, F>,
+        t_i: F,
+        t_o: F,
+        cos_o: F,
+        w: &[C::Wavelengths],
+    ) -> C::Columns<F> {
+        let scale = cos_o * t_i * t_o * F::splat(FRAC_1_PI / (self.eta * self.eta));
+        let mut value = self.diffuse_reflectance.eval_lanes(at, w);
+        let internal = F::splat(self.internal_reflectance);
+        for c in 0..C::Columns::<F>::CHANNELS {
+            let diffuse = value[c];
+            let again = if self.nonlinear { diffuse } else { F::one() };
+            value = value.with(c, scale * diffuse / (F::one() - again * internal));
+        }
+        value
     }
 
     /// With what weight in [0, 1] the coat's own reflection is sampled, rather than the base.
@@ -95,14 +98,12 @@ impl<C: ColorModel> Base<C> {
 }
 
 /// The probability of sampling the coat, of which `reflectance` is reflected, rather than the base.
-pub(super) fn coat_probability(reflectance: f32, specular_weight: f32) -> f32 {
-    let specular = reflectance * specular_weight;
-    let diffuse = (1.0 - reflectance) * (1.0 - specular_weight);
-    if specular + diffuse > 0.0 {
-        specular / (specular + diffuse)
-    } else {
-        1.0
-    }
+#[inline(always)]
+pub(super) fn coat_probability<F: Lanes>(reflectance: F, specular_weight: f32) -> F {
+    let specular = reflectance * F::splat(specular_weight);
+    let diffuse = (F::one() - reflectance) * F::splat(1.0 - specular_weight);
+    let either = specular + diffuse;
+    F::select(F::zero().lt(either), specular / either, F::one())
 }
 
 impl<C: ColorModel> Plastic<C> {
@@ -125,10 +126,6 @@ impl<C: ColorModel> Plastic<C> {
             specular_reflectance,
         })
     }
-
-    fn fresnel(&self, cos: f32) -> f32 {
-        fresnel::dielectric(cos, self.base.eta).reflectance
-    }
 }
 
 impl<C: ColorModel> Bsdf<C> for Plastic<C> {
@@ -136,48 +133,49 @@ impl<C: ColorModel> Bsdf<C> for Plastic<C> {
         Lobes::REFLECTION
     }
 
-    fn eval(
+    single_face!();
+}
+
+impl<C: ColorModel> BlockBsdf<C> for Plastic<C> {
+    #[inline(always)]
+    fn eval_lanes<F: Lanes>(
         &self,
-        at: &Interaction<'_>,
-        wi: Vec3,
-        wo: Vec3,
-        w: &C::Wavelengths,
-    ) -> Option<BsdfValue<C::Sample>> {
-        if wi.z <= 0.0 || wo.z <= 0.0 {
-            return None;
-        }
-        let (f_i, f_o) = (self.fresnel(wi.z), self.fresnel(wo.z));
-        let probability = 1.0 - coat_probability(f_i, self.specular_weight);
-        Some(BsdfValue {
-            value: self.base.eval(at, 1.0 - f_i, 1.0 - f_o, wo.z, w),
-            pdf: probability * warp::cosine_hemisphere_pdf(wo.z),
-        })
+        at: &Points<'_, F>,
+        wi: Vec3<F>,
+        wo: Vec3<F>,
+        w: &[C::Wavelengths],
+    ) -> BsdfValues<F, C::Columns<F>> {
+        let (zero, one) = (F::zero(), F::one());
+        let reflectance = fresnel::dielectric(wi.z, self.base.eta).reflectance;
+        let t_o = one - fresnel::dielectric(wo.z, self.base.eta).reflectance;
+        let base = one - coat_probability(reflectance, self.specular_weight);
+        let values = BsdfValues {
+            value: self.base.eval(at, one - reflectance, t_o, wo.z, w),
+            pdf: base * warp::cosine_hemisphere_pdf(wo.z),
+        };
+        values.only(zero.lt(wi.z) & zero.lt(wo.z))
     }
 
-    fn sample(
+    #[inline(always)]
+    fn sample_lanes<F: Lanes>(
         &self,
-        at: &Interaction<'_>,
-        wi: Vec3,
-        u1: f32,
-        u2: Vec2,
-        w: &C::Wavelengths,
-    ) -> Option<BsdfSample<C::Sample>> {
-        if wi.z <= 0.0 {
-            return None;
-        }
-        let reflectance = self.fresnel(wi.z);
+        at: &Points<'_, F>,
+        wi: Vec3<F>,
+        u1: F,
+        u2: Vec2<F>,
+        w: &[C::Wavelengths],
+    ) -> BsdfSamples<F, C::Columns<F>> {
+        let reflectance = fresnel::dielectric(wi.z, self.base.eta).reflectance;
         let probability = coat_probability(reflectance, self.specular_weight);
-        if u1 < probability {
-            return Some(BsdfSample {
-                wo: fresnel::mirror(wi),
-                weight: self.specular_reflectance.eval(at, w) * (reflectance / probability),
-                pdf: probability,
-                eta: 1.0,
-                delta: true,
-                null: false,
-            });
-        }
+        let factor = self.specular_reflectance.eval_lanes(at, w);
+        let coat = BsdfSamples::delta(
+            F::zero().lt(wi.z),
+            fresnel::mirror(wi),
+            factor * (reflectance / probability),
+            probability,
+        );
         let wo = warp::cosine_hemisphere(u2);
-        self.eval(at, wi, wo, w)?.as_sample(wo, 1.0)
+        let base = self.eval_lanes(at, wi, wo, w).as_samples(wo, F::one());
+        BsdfSamples::select(u1.lt(probability), coat, base)
     }
 }

@@ -15,7 +15,7 @@ use crate::description::Properties;
 use crate::description::declared::{Plugin, float, number as number_row};
 use crate::error::Result;
 use crate::interaction::Interaction;
-use crate::math::warp;
+use crate::lanes::warp;
 use crate::texture::{Palettes, Texture};
 
 /// Disney's material.
@@ -185,10 +185,12 @@ impl<C: ColorModel> Bsdf<C> for Principled<C> {
         let (cos_m, cos_d) = (wi.dot(m), wo.dot(m));
         let fresnel = fresnel::dielectric(cos_m, self.eta).reflectance;
         let distribution = point.distribution(1.0);
-        let scale =
-            distribution.eval(m) * distribution.g(wi, wo, m) * interface.jacobian * cos_m.abs()
-                / cos_i;
-        let facets = distribution.pdf(wi * wi.z.signum(), m) * interface.jacobian;
+        let scale = distribution.eval(m.into())
+            * distribution.g(wi.into(), wo.into(), m.into())
+            * interface.jacobian
+            * cos_m.abs()
+            / cos_i;
+        let facets = distribution.pdf((wi * wi.z.signum()).into(), m.into()) * interface.jacobian;
         // Light refracted or reflected by the main facets; metal only reflects.
         let transmitted = if front {
             mix.glass * (1.0 - fresnel)
@@ -240,12 +242,16 @@ impl<C: ColorModel> Bsdf<C> for Principled<C> {
         let shares = self.shares(front, &mix)?;
         let (mut eta, mut reflected) = (1.0, true);
         let wo = if u1 < shares.diffuse {
-            warp::cosine_hemisphere(u2)
+            Vec3::from(warp::cosine_hemisphere(u2.into()))
         } else if u1 < shares.diffuse + shares.clearcoat {
             let coat = Coat::new(number(&self.clearcoat_gloss, at));
-            fresnel::reflect(wi, coat.sample(u2))
+            Vec3::from(fresnel::reflect(wi.into(), coat.sample(u2).into()))
         } else {
-            let m = point.distribution(1.0).sample(wi * wi.z.signum(), u2);
+            let m = Vec3::from(
+                point
+                    .distribution(1.0)
+                    .sample((wi * wi.z.signum()).into(), u2.into()),
+            );
             let boundary = fresnel::dielectric(wi.dot(m), self.eta);
             let passing = 1.0 - boundary.reflectance;
             let passing = if front { mix.glass * passing } else { passing };
@@ -253,9 +259,9 @@ impl<C: ColorModel> Bsdf<C> for Principled<C> {
             if u < passing {
                 eta = boundary.eta;
                 reflected = false;
-                fresnel::refract(wi, m, &boundary)
+                Vec3::from(fresnel::refract(wi.into(), m.into(), &boundary))
             } else {
-                fresnel::reflect(wi, m)
+                Vec3::from(fresnel::reflect((wi).into(), m.into()))
             }
         };
         if (wo.z * wi.z > 0.0) != reflected {

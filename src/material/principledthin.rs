@@ -14,7 +14,7 @@ use crate::description::Properties;
 use crate::description::declared::{Plugin, number as number_row};
 use crate::error::Result;
 use crate::interaction::Interaction;
-use crate::math::warp;
+use crate::lanes::warp;
 use crate::texture::{Palettes, Texture};
 
 /// Disney's thin material.
@@ -93,7 +93,7 @@ impl<C: ColorModel> PrincipledThin<C> {
     }
 
     /// The facets at which light passes, which the two boundaries make rougher or smoother.
-    fn passing(point: &Point<C::Sample>, eta: f32) -> Distribution {
+    fn passing(point: &Point<C::Sample>, eta: f32) -> Distribution<f32> {
         point.distribution(0.65 * eta - 0.35)
     }
 }
@@ -135,7 +135,7 @@ impl<C: ColorModel> Bsdf<C> for PrincipledThin<C> {
         let matte = 1.0 - point.spec_trans;
         if reflection {
             let distribution = point.distribution(1.0);
-            let dg = distribution.eval(m) * distribution.g(wi, wo, m);
+            let dg = distribution.eval(m.into()) * distribution.g(wi.into(), wo.into(), m.into());
             let specular = point.spec_trans * dg / (4.0 * wi.z);
             let r0 = normal_reflectance(eta);
             let reflected = point.tint.map(|tint| {
@@ -146,7 +146,7 @@ impl<C: ColorModel> Bsdf<C> for PrincipledThin<C> {
             let diffuse = point.diffuse(wi.z, cos_o, cos_d) + point.sheen(cos_d);
             return Some(BsdfValue {
                 value: reflected + diffuse * (matte * (1.0 - diff_trans) * cos_o),
-                pdf: shares.specular_reflection * distribution.pdf(wi, m) * jacobian
+                pdf: shares.specular_reflection * distribution.pdf(wi.into(), m.into()) * jacobian
                     + shares.diffuse_reflection * warp::cosine_hemisphere_pdf(cos_o),
             });
         }
@@ -156,9 +156,9 @@ impl<C: ColorModel> Bsdf<C> for PrincipledThin<C> {
         // Mitsuba leaves out facets that would be seen from behind on the other side.
         if wo.dot(m) < 0.0 {
             let distribution = Self::passing(&point, eta);
-            let dg = distribution.eval(m) * distribution.g(wi, wo, m);
+            let dg = distribution.eval(m.into()) * distribution.g(wi.into(), wo.into(), m.into());
             value += point.spec_trans * (1.0 - fresnel) * dg / (4.0 * wi.z);
-            pdf += shares.specular_transmission * distribution.pdf(wi, m) * jacobian;
+            pdf += shares.specular_transmission * distribution.pdf(wi.into(), m.into()) * jacobian;
         }
         (pdf > 0.0).then(|| BsdfValue {
             value: point.base_color * value,
@@ -183,17 +183,19 @@ impl<C: ColorModel> Bsdf<C> for PrincipledThin<C> {
         let passed = shares.specular_reflection + shares.specular_transmission;
         // Whether light comes out on the side of the surface, and of its facet, that it should.
         let (wo, fits) = if u1 < shares.specular_reflection {
-            let m = point.distribution(1.0).sample(wi * up, u2);
-            let wo = fresnel::reflect(wi * up, m);
+            let m = Vec3::from(point.distribution(1.0).sample((wi * up).into(), u2.into()));
+            let wo = Vec3::from(fresnel::reflect((wi * up).into(), m.into()));
             (wo, wo.z > 0.0)
         } else if u1 < passed {
-            let m = Self::passing(&point, number(&self.eta, at)).sample(wi * up, u2);
-            let wo = through(fresnel::reflect(wi * up, m));
+            let m = Vec3::from(
+                Self::passing(&point, number(&self.eta, at)).sample((wi * up).into(), u2.into()),
+            );
+            let wo = through(Vec3::from(fresnel::reflect((wi * up).into(), m.into())));
             (wo, wo.z < 0.0 && wo.dot(m) < 0.0)
         } else if u1 < passed + shares.diffuse_reflection {
-            (warp::cosine_hemisphere(u2), true)
+            (Vec3::from(warp::cosine_hemisphere(u2.into())), true)
         } else {
-            (-warp::cosine_hemisphere(u2), true)
+            (-Vec3::from(warp::cosine_hemisphere(u2.into())), true)
         };
         if !fits {
             return None;

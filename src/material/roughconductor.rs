@@ -2,16 +2,15 @@
 //! Walter et al., 2007). `material`, or `eta` and `k`, as for a conductor; `distribution` beckmann or ggx;
 //! `alpha` (0.1), or `alpha_u` and `alpha_v`, may be textures; `specular_reflectance` (1) multiplies.
 
-use glam::{Vec2, Vec3};
-
 use super::ior::Complex;
 use super::microfacet::Roughness;
-use super::{Bsdf, BsdfSample, BsdfValue, Lobes, fresnel};
+use super::{BlockBsdf, Bsdf, BsdfSamples, BsdfValues, Lobes, fresnel, single_face};
 use crate::color::{ColorModel, Role};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, texture};
 use crate::error::Result;
-use crate::interaction::Interaction;
+use crate::interaction::Points;
+use crate::lanes::{Lanes, Vec2, Vec3};
 use crate::texture::{Palettes, Texture};
 
 /// A rough metal.
@@ -54,40 +53,41 @@ impl<C: ColorModel> Bsdf<C> for RoughConductor<C> {
         Lobes::REFLECTION
     }
 
-    fn eval(
+    single_face!();
+}
+
+impl<C: ColorModel> BlockBsdf<C> for RoughConductor<C> {
+    #[inline(always)]
+    fn eval_lanes<F: Lanes>(
         &self,
-        at: &Interaction<'_>,
-        wi: Vec3,
-        wo: Vec3,
-        w: &C::Wavelengths,
-    ) -> Option<BsdfValue<C::Sample>> {
-        if wi.z <= 0.0 || wo.z <= 0.0 {
-            return None;
-        }
-        let distribution = self.roughness.at(at);
+        at: &Points<'_, F>,
+        wi: Vec3<F>,
+        wo: Vec3<F>,
+        w: &[C::Wavelengths],
+    ) -> BsdfValues<F, C::Columns<F>> {
+        let (zero, four) = (F::zero(), F::splat(4.0));
+        let facets = self.roughness.at_lanes(at);
         let m = (wi + wo).normalize();
-        let scale = distribution.eval(m) * distribution.g(wi, wo, m) / (4.0 * wi.z);
-        (scale > 0.0).then(|| BsdfValue {
-            value: self.index.fresnel(at, wi.dot(m), w)
-                * self.specular_reflectance.eval(at, w)
-                * scale,
-            pdf: distribution.pdf(wi, m) / (4.0 * wo.dot(m)),
-        })
+        let scale = facets.eval(m) * facets.g(wi, wo, m) / (four * wi.z);
+        let factor = self.specular_reflectance.eval_lanes(at, w);
+        let values = BsdfValues {
+            value: self.index.fresnel(at, wi.dot(m), w) * factor * scale,
+            pdf: facets.pdf(wi, m) / (four * wo.dot(m)),
+        };
+        values.only(zero.lt(wi.z) & zero.lt(wo.z) & zero.lt(scale))
     }
 
-    fn sample(
+    #[inline(always)]
+    fn sample_lanes<F: Lanes>(
         &self,
-        at: &Interaction<'_>,
-        wi: Vec3,
-        _u1: f32,
-        u2: Vec2,
-        w: &C::Wavelengths,
-    ) -> Option<BsdfSample<C::Sample>> {
-        if wi.z <= 0.0 {
-            return None;
-        }
-        let m = self.roughness.at(at).sample(wi, u2);
+        at: &Points<'_, F>,
+        wi: Vec3<F>,
+        _u1: F,
+        u2: Vec2<F>,
+        w: &[C::Wavelengths],
+    ) -> BsdfSamples<F, C::Columns<F>> {
+        let m = self.roughness.at_lanes(at).sample(wi, u2);
         let wo = fresnel::reflect(wi, m);
-        self.eval(at, wi, wo, w)?.as_sample(wo, 1.0)
+        self.eval_lanes(at, wi, wo, w).as_samples(wo, F::one())
     }
 }

@@ -47,7 +47,7 @@ impl<C: ColorModel> RoughDielectric<C> {
 
 /// The distribution to draw from: broader where facets are drawn by area, which keeps weights small
 /// (Walter et al., §5.3).
-fn drawn_from(distribution: Distribution, wi: Vec3) -> Distribution {
+fn drawn_from(distribution: Distribution<f32>, wi: Vec3) -> Distribution<f32> {
     if distribution.samples_visible() {
         distribution
     } else {
@@ -74,7 +74,7 @@ impl<C: ColorModel> Bsdf<C> for RoughDielectric<C> {
         let distribution = self.roughness.at(at);
         let m = interface.m;
         let reflectance = fresnel::dielectric(wi.dot(m), self.eta).reflectance;
-        let dg = distribution.eval(m) * distribution.g(wi, wo, m);
+        let dg = distribution.eval(m.into()) * distribution.g(wi.into(), wo.into(), m.into());
         if dg == 0.0 {
             return None;
         }
@@ -89,7 +89,7 @@ impl<C: ColorModel> Bsdf<C> for RoughDielectric<C> {
             )
         };
         let scale = share * dg * radiance * interface.jacobian * (wi.dot(m) / wi.z).abs();
-        let facets = drawn_from(distribution, wi).pdf(wi * wi.z.signum(), m);
+        let facets = drawn_from(distribution, wi).pdf((wi * wi.z.signum()).into(), m.into());
         Some(BsdfValue {
             value: factor.eval(at, w) * scale,
             pdf: facets * share * interface.jacobian,
@@ -108,13 +108,16 @@ impl<C: ColorModel> Bsdf<C> for RoughDielectric<C> {
             return None;
         }
         let distribution = drawn_from(self.roughness.at(at), wi);
-        let m = distribution.sample(wi * wi.z.signum(), u2);
+        let m = Vec3::from(distribution.sample((wi * wi.z.signum()).into(), u2.into()));
         let boundary = fresnel::dielectric(wi.dot(m), self.eta);
         let reflected = u1 < boundary.reflectance;
         let (wo, eta) = if reflected {
-            (fresnel::reflect(wi, m), 1.0)
+            (Vec3::from(fresnel::reflect((wi).into(), m.into())), 1.0)
         } else {
-            (fresnel::refract(wi, m, &boundary), boundary.eta)
+            (
+                Vec3::from(fresnel::refract(wi.into(), m.into(), &boundary)),
+                boundary.eta,
+            )
         };
         if (wo.z * wi.z > 0.0) != reflected {
             return None; // the facet sends the light to the wrong side of the surface

@@ -4,25 +4,25 @@
 
 use std::sync::Arc;
 
-use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::microfacet::{Distribution, Kind};
 use super::plastic::{Base, coat_probability};
-use super::{Bsdf, BsdfSample, BsdfValue, Lobes, fresnel, ior};
+use super::{BlockBsdf, Bsdf, BsdfSamples, BsdfValues, Lobes, fresnel, ior, single_face};
 use crate::color::{ColorModel, Role};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, float};
 use crate::error::Result;
-use crate::interaction::Interaction;
-use crate::math::{quadrature, warp};
+use crate::interaction::Points;
+use crate::lanes::{Lanes, Vec2, Vec3, warp};
+use crate::math::quadrature;
 use crate::texture::{Palettes, Texture};
 
 /// A matte base under a rough coat.
 #[derive(Clone, Debug)]
 pub struct RoughPlastic<C: ColorModel> {
     base: Base<C>,
-    distribution: Distribution,
+    distribution: Distribution<f32>,
     /// The share of light that passes the coat from outside, at equal steps of the cosine from 0 to 1.
     transmittance: Arc<[f32]>,
     specular_reflectance: Texture<C>,
@@ -61,7 +61,7 @@ impl<C: ColorModel> RoughPlastic<C> {
             ..kind
         };
         let facets = Distribution::new(visible, alpha, alpha);
-        let table = |f: fn(&Distribution, f32, f32) -> f32, eta| -> Vec<f32> {
+        let table = |f: fn(&Distribution<f32>, f32, f32) -> f32, eta| -> Vec<f32> {
             let cosines = (0..STEPS).into_par_iter().map(cosine);
             cosines.map(|cos| f(&facets, cos, eta)).collect()
         };
@@ -81,23 +81,37 @@ impl<C: ColorModel> RoughPlastic<C> {
         })
     }
 
-    /// The share of light that passes the coat at the cosine `cos` ≥ 0.
-    fn passes(&self, cos: f32) -> f32 {
-        let x = cos * (STEPS - 1) as f32;
-        let i = (x as usize).min(STEPS - 2);
-        let f = x - i as f32;
-        self.transmittance[i] * (1.0 - f) + self.transmittance[i + 1] * f
+    /// The share of light that passes the coat at the cosine `cos`; that at 0 where it is below.
+    #[inline(always)]
+    fn passes<F: Lanes>(&self, cos: F) -> F {
+        let x = cos.clamp(0.0, 1.0) * F::splat((STEPS - 1) as f32);
+        let (mut low, mut high, mut between) = (F::ROW, F::ROW, F::ROW);
+        for lane in 0..F::WIDTH {
+            let x = x.lane(lane);
+            let i = (x as usize).min(STEPS - 2);
+            low[lane] = self.transmittance[i];
+            high[lane] = self.transmittance[i + 1];
+            between[lane] = x - i as f32;
+        }
+        let f = F::load(&between);
+        F::load(&low) * (F::one() - f) + F::load(&high) * f
+    }
+
+    /// The distribution in lanes.
+    #[inline(always)]
+    fn facets<F: Lanes>(&self) -> Distribution<F> {
+        self.distribution.all()
     }
 }
 
 /// The mean of `f`(wi, facet) over the facets that are seen at the cosine `cos`.
 fn mean_over_facets(
-    facets: &Distribution,
+    facets: &Distribution<f32>,
     cos: f32,
     eta: f32,
-    f: impl Fn(Vec3, Vec3) -> f32,
+    f: impl Fn(Vec3<f32>, Vec3<f32>) -> f32,
 ) -> f32 {
-    let wi = Vec3::new((1.0 - cos * cos).max(0.0).sqrt(), 0.0, cos);
+    let wi = Vec3::new(f32::max(1.0 - cos * cos, 0.0).sqrt(), 0.0, cos);
     // Total reflection makes a step in the integrand.
     let rule = quadrature::gauss_legendre(if eta > 1.0 { 32 } else { 64 });
     let mut sum = 0.0;
@@ -111,7 +125,7 @@ fn mean_over_facets(
 }
 
 /// The share of light that a rough boundary reflects.
-fn reflectance(facets: &Distribution, cos: f32, eta: f32) -> f32 {
+fn reflectance(facets: &Distribution<f32>, cos: f32, eta: f32) -> f32 {
     mean_over_facets(facets, cos, eta, |wi, m| {
         let wo = fresnel::reflect(wi, m);
         if wo.z <= 0.0 {
@@ -122,7 +136,7 @@ fn reflectance(facets: &Distribution, cos: f32, eta: f32) -> f32 {
 }
 
 /// The share of light that passes a rough boundary.
-fn transmittance(facets: &Distribution, cos: f32, eta: f32) -> f32 {
+fn transmittance(facets: &Distribution<f32>, cos: f32, eta: f32) -> f32 {
     mean_over_facets(facets, cos, eta, |wi, m| {
         let boundary = fresnel::dielectric(wi.dot(m), eta);
         let wo = fresnel::refract(wi, m, &boundary);
@@ -138,47 +152,49 @@ impl<C: ColorModel> Bsdf<C> for RoughPlastic<C> {
         Lobes::REFLECTION
     }
 
-    fn eval(
+    single_face!();
+}
+
+impl<C: ColorModel> BlockBsdf<C> for RoughPlastic<C> {
+    #[inline(always)]
+    fn eval_lanes<F: Lanes>(
         &self,
-        at: &Interaction<'_>,
-        wi: Vec3,
-        wo: Vec3,
-        w: &C::Wavelengths,
-    ) -> Option<BsdfValue<C::Sample>> {
-        if wi.z <= 0.0 || wo.z <= 0.0 {
-            return None;
-        }
+        at: &Points<'_, F>,
+        wi: Vec3<F>,
+        wo: Vec3<F>,
+        w: &[C::Wavelengths],
+    ) -> BsdfValues<F, C::Columns<F>> {
+        let (zero, one, four) = (F::zero(), F::one(), F::splat(4.0));
+        let facets = self.facets::<F>();
         let m = (wi + wo).normalize();
-        let d = self.distribution.eval(m);
         let (t_i, t_o) = (self.passes(wi.z), self.passes(wo.z));
         let reflectance = fresnel::dielectric(wi.dot(m), self.base.eta).reflectance;
-        let specular = reflectance * d * self.distribution.g(wi, wo, m) / (4.0 * wi.z);
-        let probability = coat_probability(1.0 - t_i, self.specular_weight);
-        let coat_pdf = self.distribution.pdf(wi, m) / (4.0 * wo.dot(m));
-        Some(BsdfValue {
-            value: self.specular_reflectance.eval(at, w) * specular
+        let specular = reflectance * facets.eval(m) * facets.g(wi, wo, m) / (four * wi.z);
+        let probability = coat_probability(one - t_i, self.specular_weight);
+        let coat_pdf = facets.pdf(wi, m) / (four * wo.dot(m));
+        let base_pdf = warp::cosine_hemisphere_pdf(wo.z);
+        let values = BsdfValues {
+            value: self.specular_reflectance.eval_lanes(at, w) * specular
                 + self.base.eval(at, t_i, t_o, wo.z, w),
-            pdf: probability * coat_pdf + (1.0 - probability) * warp::cosine_hemisphere_pdf(wo.z),
-        })
+            pdf: probability * coat_pdf + (one - probability) * base_pdf,
+        };
+        values.only(zero.lt(wi.z) & zero.lt(wo.z))
     }
 
-    fn sample(
+    #[inline(always)]
+    fn sample_lanes<F: Lanes>(
         &self,
-        at: &Interaction<'_>,
-        wi: Vec3,
-        u1: f32,
-        u2: Vec2,
-        w: &C::Wavelengths,
-    ) -> Option<BsdfSample<C::Sample>> {
-        if wi.z <= 0.0 {
-            return None;
-        }
-        let probability = coat_probability(1.0 - self.passes(wi.z), self.specular_weight);
-        let wo = if u1 < probability {
-            fresnel::reflect(wi, self.distribution.sample(wi, u2))
-        } else {
-            warp::cosine_hemisphere(u2)
-        };
-        self.eval(at, wi, wo, w)?.as_sample(wo, 1.0)
+        at: &Points<'_, F>,
+        wi: Vec3<F>,
+        u1: F,
+        u2: Vec2<F>,
+        w: &[C::Wavelengths],
+    ) -> BsdfSamples<F, C::Columns<F>> {
+        let reflected = F::one() - self.passes(wi.z);
+        let probability = coat_probability(reflected, self.specular_weight);
+        let coat = fresnel::reflect(wi, self.facets::<F>().sample(wi, u2));
+        let base = warp::cosine_hemisphere(u2);
+        let wo = Vec3::select(u1.lt(probability), coat, base);
+        self.eval_lanes(at, wi, wo, w).as_samples(wo, F::one())
     }
 }

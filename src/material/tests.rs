@@ -7,7 +7,8 @@ use glam::{Vec2, Vec3};
 use super::*;
 use crate::color::Rgb;
 use crate::description::{Description, Options};
-use crate::math::{random, warp};
+use crate::lanes::warp;
+use crate::math::random;
 
 /// Scene text of each material under test, a member of the family at least once.
 const MATERIALS: &[(&str, &str)] = &[
@@ -250,7 +251,7 @@ fn every_material_draws_directions_with_the_density_that_it_says() {
             let fine = 960;
             for i in 0..fine * fine {
                 let u = Vec2::new((i / fine) as f32 + 0.5, (i % fine) as f32 + 0.5) / fine as f32;
-                let wo = warp::uniform_sphere(u);
+                let wo = Vec3::from(warp::uniform_sphere(u.into()));
                 if let Some(value) = material.eval(&interaction(), wi, wo, &()) {
                     let share = 4.0 * std::f64::consts::PI / f64::from(fine * fine);
                     expected[cell(wo)] += f64::from(value.pdf) * share * f64::from(n);
@@ -279,7 +280,10 @@ fn reflection_is_reciprocal() {
         for i in 0..2000 {
             let (_, u) = uniforms(i);
             let (_, v) = uniforms(i + 10_000);
-            let (a, b) = (warp::uniform_sphere(u), warp::uniform_sphere(v));
+            let (a, b) = (
+                Vec3::from(warp::uniform_sphere(u.into())),
+                Vec3::from(warp::uniform_sphere(v.into())),
+            );
             if a.z * b.z <= 0.01 {
                 continue; // transmission scales with the index of refraction
             }

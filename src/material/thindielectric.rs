@@ -59,7 +59,7 @@ impl<C: ColorModel> Bsdf<C> for ThinDielectric<C> {
         let reflectance = once * 2.0 / (1.0 + once);
         if u1 < reflectance {
             return Some(BsdfSample {
-                wo: fresnel::mirror(wi),
+                wo: fresnel::mirror::<f32>(wi.into()).into(),
                 weight: self.specular_reflectance.eval(at, w),
                 pdf: reflectance,
                 eta: 1.0,

@@ -1,13 +1,14 @@
 //! `twosided`: lets a one-sided material be seen from both sides; a second nested one covers the back.
 
-use glam::{Vec2, Vec3};
-
-use super::{Bsdf, BsdfSample, BsdfValue, Lobes, Material, PhongTerms, nested};
+use super::{
+    BlockBsdf, Bsdf, BsdfSamples, BsdfValues, Lobes, Material, PhongTerms, nested, single_face,
+};
 use crate::color::ColorModel;
 use crate::description::declared::{Plugin, boolean, nested as nested_row};
 use crate::description::{Kind, Properties};
 use crate::error::Result;
-use crate::interaction::Interaction;
+use crate::interaction::{Interaction, Points};
+use crate::lanes::{Lanes, Mask as _, Vec2, Vec3};
 use crate::texture::Palettes;
 
 /// A material for each side.
@@ -50,16 +51,16 @@ impl<C: ColorModel> TwoSided<C> {
     }
 
     /// The material on the side of `wi`, and the factor that brings it to the front.
-    fn side(&self, wi: Vec3) -> (&Material<C>, Vec3) {
+    fn side(&self, wi: glam::Vec3) -> (&Material<C>, glam::Vec3) {
         match &self.back {
-            _ if wi.z >= 0.0 => (&self.front, Vec3::ONE),
+            _ if wi.z >= 0.0 => (&self.front, glam::Vec3::ONE),
             Some(back) => (back, FLIP),
             None => (&self.front, FLIP),
         }
     }
 }
 
-const FLIP: Vec3 = Vec3::new(1.0, 1.0, -1.0);
+const FLIP: glam::Vec3 = glam::Vec3::new(1.0, 1.0, -1.0);
 
 impl<C: ColorModel> Bsdf<C> for TwoSided<C> {
     fn lobes(&self) -> Lobes {
@@ -70,46 +71,74 @@ impl<C: ColorModel> Bsdf<C> for TwoSided<C> {
         }
     }
 
-    fn eval(
-        &self,
-        at: &Interaction<'_>,
-        wi: Vec3,
-        wo: Vec3,
-        w: &C::Wavelengths,
-    ) -> Option<BsdfValue<C::Sample>> {
-        let (material, flip) = self.side(wi);
-        material.eval(at, wi * flip, wo * flip, w)
-    }
-
-    fn sample(
-        &self,
-        at: &Interaction<'_>,
-        wi: Vec3,
-        u1: f32,
-        u2: Vec2,
-        w: &C::Wavelengths,
-    ) -> Option<BsdfSample<C::Sample>> {
-        let (material, flip) = self.side(wi);
-        let sample = material.sample(at, wi * flip, u1, u2, w)?;
-        Some(BsdfSample {
-            wo: sample.wo * flip,
-            ..sample
-        })
-    }
+    single_face!();
 
     fn phong(
         &self,
         at: &Interaction<'_>,
-        wi: Vec3,
-        wo: Vec3,
+        wi: glam::Vec3,
+        wo: glam::Vec3,
         w: &C::Wavelengths,
     ) -> Option<PhongTerms<C::Sample>> {
         let (material, flip) = self.side(wi);
         material.phong(at, wi * flip, wo * flip, w)
     }
 
-    fn ambient(&self, at: &Interaction<'_>, wi: Vec3, w: &C::Wavelengths) -> C::Sample {
+    fn ambient(&self, at: &Interaction<'_>, wi: glam::Vec3, w: &C::Wavelengths) -> C::Sample {
         let (material, flip) = self.side(wi);
         material.ambient(at, wi * flip, w)
+    }
+}
+
+impl<C: ColorModel> TwoSided<C> {
+    /// Points of which those seen from behind are turned over.
+    #[inline(always)]
+    fn turned<F: Lanes>(behind: F::Mask, v: Vec3<F>) -> Vec3<F> {
+        Vec3::new(v.x, v.y, F::select(behind, -v.z, v.z))
+    }
+}
+
+impl<C: ColorModel> BlockBsdf<C> for TwoSided<C> {
+    #[inline(always)]
+    fn eval_lanes<F: Lanes>(
+        &self,
+        at: &Points<'_, F>,
+        wi: Vec3<F>,
+        wo: Vec3<F>,
+        w: &[C::Wavelengths],
+    ) -> BsdfValues<F, C::Columns<F>> {
+        let behind = wi.z.lt(F::zero());
+        let (wi, wo) = (Self::turned(behind, wi), Self::turned(behind, wo));
+        let front = self.front.eval_lanes(at, wi, wo, w);
+        match &self.back {
+            Some(back) if (behind & at.active).any() => {
+                BsdfValues::select(behind, back.eval_lanes(at, wi, wo, w), front)
+            }
+            _ => front,
+        }
+    }
+
+    #[inline(always)]
+    fn sample_lanes<F: Lanes>(
+        &self,
+        at: &Points<'_, F>,
+        wi: Vec3<F>,
+        u1: F,
+        u2: Vec2<F>,
+        w: &[C::Wavelengths],
+    ) -> BsdfSamples<F, C::Columns<F>> {
+        let behind = wi.z.lt(F::zero());
+        let wi = Self::turned(behind, wi);
+        let front = self.front.sample_lanes(at, wi, u1, u2, w);
+        let samples = match &self.back {
+            Some(back) if (behind & at.active).any() => {
+                BsdfSamples::select(behind, back.sample_lanes(at, wi, u1, u2, w), front)
+            }
+            _ => front,
+        };
+        BsdfSamples {
+            wo: Self::turned(behind, samples.wo),
+            ..samples
+        }
     }
 }

@@ -1,5 +1,6 @@
-//! Discrete and piecewise-constant distributions, sampled by inverting their cumulative sums (PBRT 4th
-//! ed., appendix A.4). Sums run in double precision.
+//! Discrete and piecewise-constant distributions. Few indices are drawn by inverting their cumulative sums (PBRT 4th
+//! ed., appendix A.4), which keeps the order of random numbers; cells of an image, by an alias table. Sums run in double
+//! precision.
 
 use glam::Vec2;
 
@@ -71,59 +72,132 @@ impl Discrete {
     }
 }
 
+/// Indices drawn in proportion to weights by one look into a table (Walker, *An efficient method for generating discrete
+/// random variables with general distributions*, 1977; made as by Vose, 1991): index i of n is drawn, and with some
+/// probability exchanged for another.
+#[derive(Clone, Debug)]
+struct Alias {
+    slots: Vec<Slot>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Slot {
+    /// From this fraction of the slot on the other index is meant.
+    threshold: f32,
+    other: u32,
+}
+
+impl Alias {
+    /// From weights of which at least one is positive and none negative.
+    fn new(weights: &[f64], total: f64) -> Self {
+        let scale = weights.len() as f64 / total;
+        let mut rest: Vec<f64> = weights.iter().map(|w| w * scale).collect();
+        let own = |i: usize| Slot {
+            threshold: 1.0,
+            other: i as u32,
+        };
+        let mut slots: Vec<Slot> = (0..rest.len()).map(own).collect();
+        let (mut small, mut large): (Vec<usize>, Vec<usize>) =
+            (0..rest.len()).partition(|&i| rest[i] < 1.0);
+        while let (Some(&less), Some(&more)) = (small.last(), large.last()) {
+            small.pop();
+            slots[less] = Slot {
+                threshold: rest[less] as f32,
+                other: more as u32,
+            };
+            rest[more] -= 1.0 - rest[less];
+            if rest[more] < 1.0 {
+                large.pop();
+                small.push(more);
+            }
+        }
+        // Only rounding leaves a slot without its other; where it has no weight, any that has stands for it.
+        if let Some(heaviest) =
+            (0..weights.len()).max_by(|&a, &b| weights[a].total_cmp(&weights[b]))
+        {
+            for &left in small.iter().filter(|&&i| weights[i] <= 0.0) {
+                slots[left] = Slot {
+                    threshold: 0.0,
+                    other: heaviest as u32,
+                };
+            }
+        }
+        Self { slots }
+    }
+
+    /// An index for `u` in [0, 1), and the number stretched over its share.
+    #[inline]
+    fn sample(&self, u: f32) -> (usize, f32) {
+        let at = u * self.slots.len() as f32;
+        let first = (at as usize).min(self.slots.len() - 1);
+        let within = at - first as f32;
+        let Slot { threshold, other } = self.slots[first];
+        let (index, rest) = if within < threshold {
+            (first, within / threshold)
+        } else {
+            (other as usize, (within - threshold) / (1.0 - threshold))
+        };
+        (index, rest.clamp(0.0, 1f32.next_down()))
+    }
+}
+
 /// A density on the unit square, constant in each cell of a grid.
 #[derive(Clone, Debug)]
 pub struct Grid {
     width: usize,
-    rows: Discrete,
-    columns: Vec<Option<Discrete>>,
+    rows: Alias,
+    columns: Vec<Option<Alias>>,
+    /// Of each cell, row by row.
+    densities: Vec<f32>,
 }
 
 impl Grid {
-    /// From `width` columns of weights, row by row; `None` where no weight is positive.
+    /// From `width` columns of weights, row by row; `None` where no weight is positive. Negative and non-finite weights
+    /// count as 0.
     pub fn new(width: usize, weights: &[f64]) -> Option<Self> {
-        let columns: Vec<_> = weights
-            .chunks_exact(width)
-            .map(|row| Discrete::new(row.iter().copied()))
+        let weights: Vec<f64> = (weights.iter())
+            .map(|w| if w.is_finite() { w.max(0.0) } else { 0.0 })
             .collect();
-        let rows = Discrete::new(
-            columns
-                .iter()
-                .map(|c| c.as_ref().map_or(0.0, Discrete::total)),
-        )?;
+        let totals: Vec<f64> = (weights.chunks_exact(width))
+            .map(|row| row.iter().sum())
+            .collect();
+        let total: f64 = totals.iter().sum();
+        if !(total > 0.0 && total.is_finite()) {
+            return None;
+        }
+        let scale = weights.len() as f64 / total;
+        let columns = (weights.chunks_exact(width).zip(&totals))
+            .map(|(row, total)| (*total > 0.0).then(|| Alias::new(row, *total)));
         Some(Self {
             width,
-            rows,
-            columns,
+            rows: Alias::new(&totals, total),
+            columns: columns.collect(),
+            densities: weights.iter().map(|w| (w * scale) as f32).collect(),
         })
     }
 
     /// A point of the unit square, and its density.
     pub fn sample(&self, u: Vec2) -> (Vec2, f32) {
-        let row = self.rows.sample(u.y);
-        let columns = self.columns[row.index]
-            .as_ref()
-            .expect("a drawn row has weight");
-        let column = columns.sample(u.x);
+        let (row, y) = self.rows.sample(u.y);
+        let Some(columns) = &self.columns[row] else {
+            unreachable!("a drawn row has weight");
+        };
+        let (column, x) = columns.sample(u.x);
         let cells = Vec2::new(self.width as f32, self.columns.len() as f32);
-        let p = Vec2::new(
-            column.index as f32 + column.rest,
-            row.index as f32 + row.rest,
-        ) / cells;
-        let density =
-            row.probability * column.probability * (self.width * self.columns.len()) as f64;
-        (p.min(Vec2::splat(1f32.next_down())), density as f32)
+        let p = Vec2::new(column as f32 + x, row as f32 + y) / cells;
+        let density = self.densities[row * self.width + column];
+        (p.min(Vec2::splat(1f32.next_down())), density)
     }
 
     /// The density at `p` in [0, 1)².
     pub fn pdf(&self, p: Vec2) -> f32 {
         let cell = |x: f32, n: usize| ((x * n as f32).max(0.0) as usize).min(n - 1);
         let (row, column) = (cell(p.y, self.columns.len()), cell(p.x, self.width));
-        self.columns[row].as_ref().map_or(0.0, |columns| {
-            let probability = self.rows.probability(row) * columns.probability(column);
-            (probability * (self.width * self.columns.len()) as f64) as f32
-        })
+        self.densities[row * self.width + column]
     }
+
+    /// Bytes that a cell takes.
+    pub const CELL: usize = size_of::<Slot>() + size_of::<f32>();
 }
 
 #[cfg(test)]

@@ -60,16 +60,13 @@ impl Frame {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::{random, warp};
-    use glam::Vec2;
+    use crate::math::random;
 
     #[test]
     fn frames_are_orthonormal_right_handed_and_invert() {
         for i in 0..1000 {
-            let n = warp::uniform_sphere(Vec2::new(
-                random::unit(random::bits(1, i)),
-                random::unit(random::bits(2, i)),
-            ));
+            let number = |key| random::unit(random::bits(key, i)) - 0.5;
+            let n = Vec3::new(number(1), number(2), number(3)).normalize();
             for frame in [
                 Frame::around(n),
                 Frame::along(n, Vec3::X),

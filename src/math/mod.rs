@@ -3,14 +3,10 @@
 //! keeps a ray from hitting the surface it leaves.
 
 pub mod distribution;
-pub mod erf;
-pub mod exp;
 pub mod frame;
-pub mod offset;
 pub mod quadrature;
 pub mod random;
 pub mod transform;
-pub mod warp;
 
 pub use frame::Frame;
 pub use transform::Transform;

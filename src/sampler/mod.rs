@@ -39,6 +39,19 @@ pub trait PointSet: std::fmt::Debug + Send + Sync {
     fn get_1d(&self, key: u64, index: u32, dimension: u32) -> f32;
     /// Coordinates `dimension`, which is even, and `dimension + 1`, placed as a pair.
     fn get_2d(&self, key: u64, index: u32, dimension: u32) -> Vec2;
+
+    /// Coordinate `dimension` of each sample.
+    fn fill_1d(&self, streams: &[Stream], dimension: u32, out: &mut [f32]) {
+        for (out, stream) in out.iter_mut().zip(streams) {
+            *out = self.get_1d(stream.key, stream.index, dimension);
+        }
+    }
+    /// Coordinates `dimension`, which is even, and `dimension + 1` of each sample.
+    fn fill_2d(&self, streams: &[Stream], dimension: u32, out: &mut [Vec2]) {
+        for (out, stream) in out.iter_mut().zip(streams) {
+            *out = self.get_2d(stream.key, stream.index, dimension);
+        }
+    }
 }
 
 family! {

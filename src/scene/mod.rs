@@ -13,7 +13,8 @@ use crate::accel::{Counts, Tracer};
 use crate::color::{ColorModel, Spectral};
 use crate::error::Problem;
 use crate::interaction::{Hit, Interaction, Ray};
-use crate::light::{Light, LightSample};
+use crate::lanes::{self, Lanes, MAX_LANES, Mask as _};
+use crate::light::{Light, LightSample, LightSamples};
 use crate::material::Material;
 
 use choice::Choice;
@@ -24,6 +25,13 @@ pub use build::{build, check_materials, light_names};
 /// A material's place in its scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct MaterialId(u32);
+
+impl MaterialId {
+    /// The material's place among the scene's.
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+}
 
 /// A light's place in its scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -111,19 +119,33 @@ impl<C: ColorModel> Scene<C> {
     }
 
     /// Whether anything lies on each ray.
-    pub fn occluded(
-        &self,
-        rays: impl Iterator<Item = Ray>,
-        blocked: &mut Vec<bool>,
-        counts: &mut Counts,
-    ) {
-        let rays: Vec<Ray> = rays.collect();
-        self.tracer.occluded(&rays, blocked, counts);
+    pub fn occluded(&self, rays: &[Ray], blocked: &mut Vec<bool>, counts: &mut Counts) {
+        self.tracer.occluded(rays, blocked, counts);
     }
 
     /// What a hit looks like.
     pub fn interaction(&self, ray: &Ray, hit: &Hit) -> Interaction<'_> {
         self.tracer.interaction(ray, hit)
+    }
+
+    /// The material of the surface that was hit.
+    pub fn material_of(&self, hit: &Hit) -> MaterialId {
+        self.surfacing[hit.shape as usize].material
+    }
+
+    /// The material with that index.
+    pub fn material_at(&self, index: usize) -> &Material<C> {
+        &self.materials[index]
+    }
+
+    /// How many materials there are.
+    pub fn material_count(&self) -> usize {
+        self.materials.len()
+    }
+
+    /// Whether there is light from nowhere.
+    pub fn has_ambient(&self) -> bool {
+        !self.ambients.is_empty()
     }
 
     /// The material at a point.
@@ -150,6 +172,37 @@ impl<C: ColorModel> Scene<C> {
             pdf: sample.pdf * self.choice.probability(chosen),
             ..sample
         })
+    }
+
+    /// Directions from points in lanes toward lights, as [`Scene::sample_light`] draws them.
+    #[inline(always)]
+    pub fn sample_lights<F: Lanes>(
+        &self,
+        from: lanes::Vec3<F>,
+        u1: F,
+        u2: lanes::Vec2<F>,
+        w: &[C::Wavelengths],
+        active: F::Mask,
+    ) -> LightSamples<F, C::Columns<F>> {
+        let mut samples = LightSamples::none();
+        let mut chosen = [None; MAX_LANES];
+        for lane in active.lanes() {
+            chosen[lane] = self.choice.sample(u1.lane(lane));
+        }
+        // One light after another.
+        let mut rest = active.to_bits();
+        while rest != 0 {
+            let light = chosen[rest.trailing_zeros() as usize];
+            let alike = (0..F::WIDTH).filter(|lane| chosen[*lane] == light);
+            let alike = rest & alike.fold(0, |bits, lane| bits | 1 << lane);
+            rest &= !alike;
+            let Some(light) = light else { continue };
+            let mask = F::Mask::from_bits(alike);
+            let mut drawn = self.light(light).sample_lanes(from, u2, w, mask);
+            drawn.pdf = drawn.pdf * F::splat(self.choice.probability(light));
+            samples = LightSamples::select(mask, drawn, samples);
+        }
+        samples
     }
 
     /// Radiance that the surface at `at` emits toward `at.wi`, and the density with which

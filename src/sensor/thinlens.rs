@@ -17,7 +17,7 @@ use crate::description::Properties;
 use crate::description::declared::{Plugin, float, integer};
 use crate::error::Result;
 use crate::interaction::Ray;
-use crate::math::warp;
+use crate::lanes::warp;
 
 /// A camera with depth of field.
 #[derive(Clone, Debug)]
@@ -61,7 +61,7 @@ impl Aperture {
     /// angle and the same fraction of the way from the centre to the rim: areas stay in proportion, and what
     /// was near stays near.
     fn point(&self, u: Vec2) -> Vec2 {
-        let p = warp::concentric_disk(u);
+        let p = Vec2::from(warp::concentric_disk(u.into()));
         let n = self.corners.len();
         if n == 0 {
             return self.radius * p;

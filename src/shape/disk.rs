@@ -11,8 +11,9 @@ use super::{
 use crate::description::Properties;
 use crate::description::declared::Plugin;
 use crate::error::Result;
-use crate::interaction::{Hit, Interaction, Ray};
-use crate::math::{Frame, offset, warp};
+use crate::interaction::{Hit, Interaction, Ray, offset};
+use crate::lanes::warp;
+use crate::math::Frame;
 
 /// A disk in world space. A hit's parameters are its local x and y.
 #[derive(Debug)]
@@ -139,7 +140,7 @@ impl Surface for Disk {
     }
 
     fn sample(&self, from: Vec3, u: Vec2) -> Option<SurfaceSample> {
-        let p = warp::concentric_disk(u);
+        let p = Vec2::from(warp::concentric_disk(u.into()));
         let sample = self.at(p);
         let pdf = area_to_solid_angle(self.area, from, sample.position, self.normal);
         (pdf > 0.0).then_some(SurfaceSample { pdf, ..sample })

@@ -1,20 +1,25 @@
 //! Triangle meshes as surfaces: boxes, what a hit looks like, and points drawn uniformly over the area, or over
 //! the solid angle of a mesh that is a rectangle.
 
+mod triangles;
+
 use std::sync::OnceLock;
 
 use glam::{DMat4, Vec2, Vec3};
 
 use super::quad::{Place, Quad};
 use super::{
-    Bounds, Chart, Geometry, Setting, Shape, Surface, SurfaceSample, area_to_solid_angle, to_world,
+    Bounds, Chart, Geometry, Setting, Shape, Surface, SurfaceSample, SurfaceSamples,
+    area_to_solid_angle, to_world,
 };
 use crate::description::Properties;
 use crate::error::Result;
 use crate::interaction::{Hit, Interaction, Ray};
+use crate::lanes::{self, Lanes, Mask as _, warp};
+use crate::math::Frame;
 use crate::math::distribution::Discrete;
-use crate::math::{Frame, offset, warp};
 use crate::mesh::{Loaded, Mesh, MeshFile, ReadOptions};
+pub use triangles::Triangles;
 
 /// A mesh in world space.
 #[derive(Debug)]
@@ -24,6 +29,8 @@ pub struct TriangleMesh {
     areas: OnceLock<Option<Discrete>>,
     /// The rectangle that it is, if it is one.
     quad: Option<Quad>,
+    /// The shading normal of a rectangle that has one all over.
+    quad_normal: Option<Vec3>,
     /// Whether its triangles have been turned over: where it has no texture coordinates, u and v are those of the
     /// triangles as they were, as in Mitsuba.
     flipped: bool,
@@ -33,13 +40,19 @@ pub struct TriangleMesh {
 impl TriangleMesh {
     /// A mesh whose coordinates are the world's.
     pub fn new(mesh: Mesh) -> Self {
-        Self {
-            quad: Quad::of(&mesh),
+        let quad = Quad::of(&mesh);
+        let mut placed = Self {
+            quad,
+            quad_normal: None,
             mesh,
             areas: OnceLock::new(),
             flipped: false,
             hash: OnceLock::new(),
+        };
+        if placed.quad.is_some() {
+            placed.quad_normal = placed.even_normal();
         }
+        placed
     }
 
     /// [`Mesh::triangles_hash`], taken once.
@@ -71,16 +84,28 @@ impl TriangleMesh {
 
     /// A triangle's geometric normal; zero where it has no area.
     pub fn triangle_normal(&self, triangle: u32) -> Vec3 {
-        Self::geometric_normal(self.corners(triangle))
+        triangles::geometric_normal::<f32>(self.corners(triangle).map(Into::into)).into()
     }
 
     /// A point drawn uniformly over one triangle, without a density.
     pub fn triangle_point(&self, triangle: u32, u: Vec2) -> SurfaceSample {
-        let b = warp::uniform_triangle(u);
+        let b = Vec2::from(warp::uniform_triangle(u.into()));
         self.at(Place {
             triangle,
             barycentric: [1.0 - b.x - b.y, b.x, b.y],
         })
+    }
+
+    /// The shading normal, where it is the same at all corners.
+    fn even_normal(&self) -> Option<Vec3> {
+        let corners = (0..self.primitive_count()).flat_map(|triangle| {
+            let geometric = self.triangle_normal(triangle);
+            let corners = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+            corners.map(|b| self.shading_normal(triangle, b, geometric))
+        });
+        let mut corners = corners;
+        let first = corners.next()?;
+        corners.all(|n| n.abs_diff_eq(first, 1e-6)).then_some(first)
     }
 
     fn areas(&self) -> Option<&Discrete> {
@@ -129,31 +154,91 @@ impl TriangleMesh {
         let [uv0, uv1, uv2] = corners.map(|i| self.mesh.uvs[i as usize]);
         b[0] * uv0 + b[1] * uv1 + b[2] * uv2
     }
+}
 
-    fn geometric_normal([a, b, c]: [Vec3; 3]) -> Vec3 {
-        // In double precision, for the cross product of a sliver cancels.
-        let [a, b, c] = [a, b, c].map(Vec3::as_dvec3);
-        (b - a).cross(c - a).normalize_or_zero().as_vec3()
+impl TriangleMesh {
+    /// [`Surface::sample`] in lanes.
+    #[inline(always)]
+    pub(super) fn sample_lanes<F: Lanes>(
+        &self,
+        from: lanes::Vec3<F>,
+        u: lanes::Vec2<F>,
+        active: F::Mask,
+    ) -> SurfaceSamples<F> {
+        let mut sample = SurfaceSamples {
+            position: lanes::Vec3::splat(0.0),
+            normal: lanes::Vec3::splat(0.0),
+            pdf: F::zero(),
+        };
+        let mut rest = active;
+        if let Some(quad) = &self.quad {
+            let seen = quad.seen(from);
+            let even = seen.is_even & active;
+            if even.any() {
+                let fractions = seen.sample(u);
+                let normal = match self.quad_normal {
+                    Some(normal) => lanes::Vec3::all(normal),
+                    None => self.quad_normals(fractions, even),
+                };
+                sample = SurfaceSamples {
+                    position: quad.at(fractions),
+                    normal,
+                    pdf: F::one() / seen.solid_angle,
+                };
+            }
+            rest = active & !even;
+        }
+        if rest.any() {
+            let other = self.sample_triangles(from, u, rest);
+            sample = SurfaceSamples::select(rest, other, sample);
+        }
+        sample
     }
 
-    /// The change of position with u and with v (PBRT 4th ed., 6.5.3); zero where the coordinates do
-    /// not tell.
-    fn tangents(&self, triangle: u32, [a, b, c]: [Vec3; 3]) -> (Vec3, Vec3) {
-        let (e1, e2) = (b - a, c - a);
-        if self.mesh.uvs.is_empty() {
-            return if self.flipped { (e2, e1) } else { (e1, e2) };
+    /// The shading normals at points of a rectangle.
+    #[inline(always)]
+    fn quad_normals<F: Lanes>(&self, fractions: lanes::Vec2<F>, active: F::Mask) -> lanes::Vec3<F> {
+        let mut triangles = Triangles::<F>::default();
+        let quad = self.quad.as_ref().expect("it is a rectangle");
+        for lane in active.lanes() {
+            let Place {
+                triangle,
+                barycentric: [_, u, v],
+            } = quad.place(fractions.lane(lane));
+            triangles.set(lane, self, triangle, Vec2::new(u, v));
         }
-        let [uv0, uv1, uv2] =
-            self.mesh.triangles[triangle as usize].map(|i| self.mesh.uvs[i as usize]);
-        let (d1, d2) = (uv1 - uv0, uv2 - uv0);
-        let determinant = d1.x * d2.y - d1.y * d2.x;
-        if determinant == 0.0 {
-            return (Vec3::ZERO, Vec3::ZERO);
+        triangles.surface().frame.n
+    }
+
+    /// Points drawn evenly over the area.
+    #[inline(always)]
+    fn sample_triangles<F: Lanes>(
+        &self,
+        from: lanes::Vec3<F>,
+        u: lanes::Vec2<F>,
+        active: F::Mask,
+    ) -> SurfaceSamples<F> {
+        let mut triangles = Triangles::<F>::default();
+        let areas = self.areas();
+        for lane in active.lanes() {
+            let Some(areas) = areas else { continue };
+            let u = u.lane(lane);
+            let drawn = areas.sample(u.x);
+            let within = warp::uniform_triangle::<f32>(Vec2::new(drawn.rest, u.y).into());
+            triangles.set(lane, self, drawn.index as u32, within.into());
         }
-        (
-            (d2.y * e1 - d1.y * e2) / determinant,
-            (d1.x * e2 - d2.x * e1) / determinant,
-        )
+        let surface = triangles.surface();
+        let area = areas.map_or(0.0, Discrete::total);
+        let way = surface.position - from;
+        let squared = way.length_squared();
+        let cosine = surface.normal.dot(way).abs() / squared.sqrt();
+        let pdf = squared / (cosine * F::splat(area as f32));
+        let drawn = active & cosine.gt(F::zero()) & pdf.is_finite();
+        SurfaceSamples {
+            position: surface.position,
+            normal: surface.frame.n,
+            pdf: F::select(drawn, pdf, F::zero()),
+        }
     }
 }
 
@@ -176,24 +261,23 @@ impl Surface for TriangleMesh {
     }
 
     fn interaction(&self, ray: &Ray, hit: &Hit) -> Interaction<'_> {
-        let corners = self.corners(hit.primitive);
-        let b = [1.0 - hit.u - hit.v, hit.u, hit.v];
-        let terms = [b[0] * corners[0], b[1] * corners[1], b[2] * corners[2]];
-        let position = terms[0] + terms[1] + terms[2];
-        let error = offset::gamma(7) * (terms[0].abs() + terms[1].abs() + terms[2].abs());
-        let normal = Self::geometric_normal(corners);
-        let shading = self.shading_normal(hit.primitive, b, normal);
-        let (dp_du, dp_dv) = self.tangents(hit.primitive, corners);
-        let frame = Frame::along(shading, dp_du);
+        let mut triangles = Triangles::<f32>::default();
+        triangles.set(0, self, hit.primitive, Vec2::new(hit.u, hit.v));
+        let surface = triangles.surface();
+        let frame = Frame {
+            s: surface.frame.s.into(),
+            t: surface.frame.t.into(),
+            n: surface.frame.n.into(),
+        };
         Interaction {
             t: hit.t,
-            position,
-            error,
-            normal,
+            position: surface.position.into(),
+            error: surface.error.into(),
+            normal: surface.normal.into(),
             frame,
-            uv: self.uv_at(hit.primitive, b),
-            dp_du,
-            dp_dv,
+            uv: surface.uv.into(),
+            dp_du: surface.dp_du.into(),
+            dp_dv: surface.dp_dv.into(),
             wi: frame.to_local(-ray.direction),
             time: ray.time,
             shape: hit.shape,
@@ -208,13 +292,14 @@ impl Surface for TriangleMesh {
     }
 
     fn sample(&self, from: Vec3, u: Vec2) -> Option<SurfaceSample> {
-        if let Some(quad) = &self.quad
-            && let Some(seen) = quad.seen(from)
-        {
-            return Some(SurfaceSample {
-                pdf: (1.0 / seen.solid_angle) as f32,
-                ..self.at(quad.place(seen.sample(u)))
-            });
+        if let Some(quad) = &self.quad {
+            let seen = quad.seen::<f32>(from.into());
+            if seen.is_even {
+                return Some(SurfaceSample {
+                    pdf: 1.0 / seen.solid_angle,
+                    ..self.at(quad.place(seen.sample(u.into()).into()))
+                });
+            }
         }
         let areas = self.areas()?;
         let drawn = areas.sample(u.x);
@@ -231,17 +316,20 @@ impl Surface for TriangleMesh {
     }
 
     fn pdf(&self, from: Vec3, at: &Interaction<'_>) -> f32 {
-        match self.quad.as_ref().and_then(|quad| quad.seen(from)) {
-            Some(seen) => (1.0 / seen.solid_angle) as f32,
-            None => area_to_solid_angle(self.area(), from, at.position, at.normal),
+        if let Some(quad) = &self.quad {
+            let seen = quad.seen::<f32>(from.into());
+            if seen.is_even {
+                return 1.0 / seen.solid_angle;
+            }
         }
+        area_to_solid_angle(self.area(), from, at.position, at.normal)
     }
 
     fn chart(&self, parameters: Vec2) -> Option<Chart> {
         let quad = self.quad.as_ref()?;
         Some(Chart {
-            point: self.at(quad.place(parameters.as_dvec2())),
-            stretch: quad.area(),
+            point: self.at(quad.place(parameters)),
+            stretch: quad.area().into(),
         })
     }
 

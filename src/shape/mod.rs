@@ -31,13 +31,14 @@ use crate::description::declared::{
 use crate::description::{Kind, Properties};
 use crate::error::{Problem, Result};
 use crate::family;
-use crate::interaction::{Hit, Interaction, Ray};
-use crate::math::{Transform, offset};
+use crate::interaction::{Hit, Interaction, Ray, offset};
+use crate::lanes::{self, Lanes, Mask as _};
+use crate::math::Transform;
 use crate::mesh::{Loaded, Mesh, MeshFile, ReadOptions, read};
 
 pub use disk::Disk;
 pub use frustum::Frustum;
-pub use mesh::TriangleMesh;
+pub use mesh::{TriangleMesh, Triangles};
 pub use plane::Plane;
 pub use sphere::Sphere;
 pub use tessellate::Untessellated;
@@ -135,6 +136,29 @@ pub struct SurfaceSample {
     pub pdf: f32,
 }
 
+/// Points drawn on a surface as seen from other points, in lanes; the fields are those of [`SurfaceSample`].
+#[derive(Clone, Copy, Debug)]
+pub struct SurfaceSamples<F> {
+    /// World space.
+    pub position: lanes::Vec3<F>,
+    /// Unit length, on the side that emits.
+    pub normal: lanes::Vec3<F>,
+    /// Density per solid angle at the other point, in 1/sr; 0 where none could be drawn.
+    pub pdf: F,
+}
+
+impl<F: Lanes> SurfaceSamples<F> {
+    /// `yes` where the mask is set, else `no`.
+    #[inline(always)]
+    fn select(mask: F::Mask, yes: Self, no: Self) -> Self {
+        Self {
+            position: lanes::Vec3::select(mask, yes.position, no.position),
+            normal: lanes::Vec3::select(mask, yes.normal, no.normal),
+            pdf: F::select(mask, yes.pdf, no.pdf),
+        }
+    }
+}
+
 /// The place on a surface that belongs to a pair of parameters in [0, 1]².
 #[derive(Clone, Copy, Debug)]
 pub struct Chart {
@@ -197,6 +221,41 @@ impl Geometry {
         match self {
             Self::Mesh(mesh) => Some(mesh.mesh()),
             _ => None,
+        }
+    }
+}
+
+impl Geometry {
+    /// [`Surface::sample`] in lanes.
+    #[inline(always)]
+    pub fn sample_lanes<F: Lanes>(
+        &self,
+        from: lanes::Vec3<F>,
+        u: lanes::Vec2<F>,
+        active: F::Mask,
+    ) -> SurfaceSamples<F> {
+        match self {
+            Self::Mesh(mesh) => mesh.sample_lanes(from, u, active),
+            Self::Sphere(sphere) => sphere.sample_lanes(from, u, active),
+            other => {
+                let (mut position, mut normal) = ([F::ROW; 3], [F::ROW; 3]);
+                let mut pdf = F::ROW;
+                for lane in active.lanes() {
+                    let Some(sample) = other.sample(from.lane(lane), u.lane(lane)) else {
+                        continue;
+                    };
+                    for axis in 0..3 {
+                        position[axis][lane] = sample.position[axis];
+                        normal[axis][lane] = sample.normal[axis];
+                    }
+                    pdf[lane] = sample.pdf;
+                }
+                SurfaceSamples {
+                    position: lanes::Vec3::load(&position),
+                    normal: lanes::Vec3::load(&normal),
+                    pdf: F::load(&pdf),
+                }
+            }
         }
     }
 }

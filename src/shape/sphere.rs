@@ -9,13 +9,15 @@ use std::f32::consts::{FRAC_1_PI, PI, TAU};
 use glam::{DMat4, DVec3, Mat3, Vec2, Vec3};
 
 use super::{
-    Bounds, Chart, Geometry, Shape, Surface, SurfaceSample, area_to_solid_angle, to_world,
+    Bounds, Chart, Geometry, Shape, Surface, SurfaceSample, SurfaceSamples, area_to_solid_angle,
+    to_world,
 };
 use crate::description::Properties;
 use crate::description::declared::{Plugin, float, vector};
 use crate::error::Result;
-use crate::interaction::{Hit, Interaction, Ray};
-use crate::math::{Frame, offset, warp};
+use crate::interaction::{Hit, Interaction, Ray, offset};
+use crate::lanes::{self, Lanes, Mask as _, warp};
+use crate::math::Frame;
 
 /// A sphere in world space.
 #[derive(Debug)]
@@ -105,8 +107,7 @@ impl Sphere {
     fn cone(&self, from: Vec3) -> Option<f64> {
         let squared = (self.center.as_dvec3() - from.as_dvec3()).length_squared();
         let sin2 = f64::from(self.radius).powi(2) / squared;
-        // From this close the sphere is sampled by area: the cone's map has no precision left.
-        (sin2 < 0.9999).then_some(sin2)
+        (sin2 < f64::from(WIDEST)).then_some(sin2)
     }
 
     /// 1 − cos of that angle, without the cancellation.
@@ -140,6 +141,54 @@ impl Sphere {
         Vec2::new(phi / TAU, local.z.clamp(-1.0, 1.0).acos() * FRAC_1_PI)
     }
 }
+
+impl Sphere {
+    /// [`Surface::sample`] in lanes.
+    #[inline(always)]
+    pub(super) fn sample_lanes<F: Lanes>(
+        &self,
+        from: lanes::Vec3<F>,
+        u: lanes::Vec2<F>,
+        active: F::Mask,
+    ) -> SurfaceSamples<F> {
+        let (zero, one) = (F::zero(), F::one());
+        let center = lanes::Vec3::all(self.center);
+        let way = center - from;
+        let squared = way.length_squared();
+        let widest = F::splat(self.radius * self.radius) / squared;
+        let outside = widest.lt(F::splat(WIDEST));
+        let whole = widest / (one + (one - widest).max(zero).sqrt());
+        let drop = u.x * whole;
+        let sin2 = drop * (one + one - drop);
+        let cos_alpha =
+            sin2 / widest.sqrt() + (one - drop) * (one - sin2 / widest).max(zero).sqrt();
+        let sin_alpha = (one - cos_alpha * cos_alpha).max(zero).sqrt();
+        let (sin, cos) = lanes::sin_cos_turns(u.y);
+        let frame = lanes::Frame::around(way * (one / squared.sqrt()));
+        let local = lanes::Vec3::new(sin_alpha * cos, sin_alpha * sin, -cos_alpha);
+        let mut outward = frame.to_world(local).normalize();
+        let mut pdf = warp::uniform_cone_pdf(whole);
+        if (active & !outside).any() {
+            let other = warp::uniform_sphere(u);
+            outward = lanes::Vec3::select(outside, outward, other);
+            let way = center + other * F::splat(self.radius) - from;
+            let squared = way.length_squared();
+            let cosine = other.dot(way).abs() / squared.sqrt();
+            let by_area = squared / (cosine * F::splat(self.area() as f32));
+            pdf = F::select(outside, pdf, by_area);
+        }
+        let drawn = active & zero.lt(pdf) & pdf.is_finite();
+        SurfaceSamples {
+            position: center + outward * F::splat(self.radius),
+            normal: outward * F::splat(self.side()),
+            pdf: F::select(drawn, pdf, zero),
+        }
+    }
+}
+
+/// From where the square of the sine of the half angle is this, the sphere is sampled by area: the cone's map has no
+/// precision left.
+const WIDEST: f32 = 0.9999;
 
 impl Surface for Sphere {
     fn primitive_count(&self) -> u32 {
@@ -222,7 +271,7 @@ impl Surface for Sphere {
 
     fn sample(&self, from: Vec3, u: Vec2) -> Option<SurfaceSample> {
         let Some(widest) = self.cone(from) else {
-            let outward = warp::uniform_sphere(u);
+            let outward = Vec3::from(warp::uniform_sphere(u.into()));
             let sample = self.at(outward);
             let pdf = area_to_solid_angle(self.area(), from, sample.position, outward);
             return (pdf > 0.0).then_some(SurfaceSample { pdf, ..sample });

@@ -5,7 +5,8 @@ use std::path::Path;
 
 use super::*;
 use crate::description::{Description, Options};
-use crate::math::{random, warp};
+use crate::lanes::warp;
+use crate::math::random;
 
 const TILTED: &str = r#"<rotate x="1" angle="30"/><translate x="0.5" y="-2" z="1"/></transform>"#;
 
@@ -95,7 +96,8 @@ fn bounds(geometry: &Geometry) -> Bounds {
 fn viewpoints(geometry: &Geometry) -> Vec<Vec3> {
     let Bounds { min, max } = bounds(geometry);
     let (center, size) = (0.5 * (min + max), (max - min).length());
-    let around = (0..6).map(|i| center + size * 0.9 * warp::uniform_sphere(point(7, i)));
+    let around =
+        (0..6).map(|i| center + size * 0.9 * Vec3::from(warp::uniform_sphere(point(7, i).into())));
     around.chain([center + Vec3::splat(0.01)]).collect()
 }
 

@@ -20,12 +20,13 @@ use std::sync::{Arc, Mutex};
 
 use glam::{Mat3, Vec2, Vec3};
 
-use crate::color::{Color, ColorModel, Mono, Rgb, Role, Spectral};
+use crate::color::{Color, ColorModel, Mono, Rgb, Role, Spectra, Spectral};
 use crate::description::declared::{Preset, Row, transform};
 use crate::description::{Kind, Properties, Property, Spectrum, Value};
 use crate::error::{Error, Problem, Result};
 use crate::family::family;
-use crate::interaction::Interaction;
+use crate::interaction::{Interaction, Points};
+use crate::lanes::{Call, Lanes, MAX_LANES, Mask as _};
 
 use bitmap::Texels;
 
@@ -67,6 +68,60 @@ family! {
         "srgb" => Srgb(srgb::Srgb<C>),
         "uniform" => Uniform(uniform::Uniform<C>),
         "zoneplate" => ZonePlate(zoneplate::ZonePlate<C>),
+    }
+}
+
+impl<C: ColorModel> Texture<C> {
+    /// The values at points in lanes, whose paths' wavelengths are given from the first lane on.
+    #[inline(always)]
+    pub fn eval_lanes<F: Lanes>(
+        &self,
+        at: &Points<'_, F>,
+        wavelengths: &[C::Wavelengths],
+    ) -> C::Columns<F> {
+        match self {
+            Self::Uniform(uniform) => C::evaluate_lanes(uniform.value(), wavelengths),
+            texture => F::call(LookUp {
+                texture,
+                at,
+                wavelengths,
+            }),
+        }
+    }
+}
+
+/// The arguments of [`Texture::eval_lanes`], of a texture that varies.
+struct LookUp<'a, C: ColorModel, F: Lanes> {
+    texture: &'a Texture<C>,
+    at: &'a Points<'a, F>,
+    wavelengths: &'a [C::Wavelengths],
+}
+
+impl<C: ColorModel, F: Lanes> Call<F> for LookUp<'_, C, F> {
+    type Output = C::Columns<F>;
+
+    /// The values of lanes that are there, one by one.
+    #[inline(always)]
+    fn run(self) -> C::Columns<F> {
+        let there = self.at.active.to_bits();
+        Spectra::from_samples(|lane| {
+            if there >> lane & 1 == 0 {
+                return C::Sample::zero();
+            }
+            let (at, w) = (self.at.texture_point(lane), &self.wavelengths[lane]);
+            match self.texture {
+                Texture::Bitmap(bitmap) => bitmap.eval(&at, w),
+                other => other.eval(&at, w),
+            }
+        })
+    }
+}
+
+impl Texture<Mono> {
+    /// The numbers at points in lanes.
+    #[inline(always)]
+    pub fn numbers<F: Lanes>(&self, at: &Points<'_, F>) -> F {
+        self.eval_lanes(at, &[(); MAX_LANES])[0]
     }
 }
 

@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 const LAYERS: &[&[&str]] = &[
     &["error"],
     &["file", "math"],
+    &["lanes"],
     &["color"],
     &["description", "image", "mesh"],
     &["family", "interaction"],

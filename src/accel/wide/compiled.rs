@@ -3,14 +3,14 @@
 #![allow(unsafe_code)]
 
 use super::batch as walks;
-use super::kernel::{Kernel, Set};
 use super::portable::Portable;
 use super::{Flight, Tree, Walker};
 use crate::accel::Counts;
+use crate::lanes::{Kernel, Set};
 
 /// Walks `count` rays; with `FETCH`, asks for memory ahead.
 pub(super) fn batch<'t, W: Walker<'t>, const ANY: bool, const FETCH: bool>(
-    Kernel(set): Kernel,
+    kernel: Kernel,
     tree: &'t Tree,
     walker: &mut W,
     count: usize,
@@ -20,7 +20,7 @@ pub(super) fn batch<'t, W: Walker<'t>, const ANY: bool, const FETCH: bool>(
     assert!(flight.levels() > tree.levels(), "room for the tree");
     // SAFETY: a `Kernel` exists only where the processor has its instructions, and there is room.
     unsafe {
-        match set {
+        match kernel.set() {
             Set::Portable => {
                 walks::batch::<Portable, W, ANY, FETCH>(tree, walker, count, flight, counts);
             }

@@ -1,4 +1,4 @@
-//! Which instructions a walk uses: picked once, by what the processor can do.
+//! The steps of a walk that are done on lanes.
 
 #![allow(unsafe_code)]
 
@@ -78,66 +78,4 @@ pub(super) struct Ends {
     pub(super) nodes: *mut u32,
     pub(super) leaves: *mut u32,
     pub(super) rest: *mut u32,
-}
-
-/// Instructions with which rays are traced. All find the same hits, to the bit.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Kernel(pub(super) Set);
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Set {
-    Portable,
-    #[cfg(target_arch = "x86_64")]
-    Avx2,
-    #[cfg(target_arch = "x86_64")]
-    Avx512,
-}
-
-impl Kernel {
-    /// All that this processor has the instructions for, the fastest last; the first is portable.
-    pub fn all() -> Vec<Self> {
-        let mut all = vec![Self(Set::Portable)];
-        #[cfg(target_arch = "x86_64")]
-        {
-            let avx2 = is_x86_feature_detected!("avx2")
-                && is_x86_feature_detected!("fma")
-                && is_x86_feature_detected!("bmi1")
-                && is_x86_feature_detected!("bmi2")
-                && is_x86_feature_detected!("lzcnt")
-                && is_x86_feature_detected!("popcnt");
-            if avx2 {
-                all.push(Self(Set::Avx2));
-            }
-            let avx512 = is_x86_feature_detected!("avx512f")
-                && is_x86_feature_detected!("avx512vl")
-                && is_x86_feature_detected!("avx512dq")
-                && is_x86_feature_detected!("avx512bw");
-            if avx2 && avx512 {
-                all.push(Self(Set::Avx512));
-            }
-        }
-        all
-    }
-
-    /// The fastest on this processor.
-    pub fn best() -> Self {
-        *Self::all().last().expect("there is a portable one")
-    }
-
-    /// Its name.
-    pub fn name(self) -> &'static str {
-        match self.0 {
-            Set::Portable => "portable",
-            #[cfg(target_arch = "x86_64")]
-            Set::Avx2 => "AVX2",
-            #[cfg(target_arch = "x86_64")]
-            Set::Avx512 => "AVX-512",
-        }
-    }
-}
-
-impl Default for Kernel {
-    fn default() -> Self {
-        Self::best()
-    }
 }

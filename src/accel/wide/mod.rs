@@ -34,12 +34,12 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::{Build, CacheUse, Counts};
+use crate::lanes::Kernel;
 use crate::shape::Bounds;
 use huge::Huge;
 use node::{Block, Node};
 use state::Flight;
 
-pub use kernel::Kernel;
 pub(super) use state::{Best, Place, Start, Visit};
 
 /// Who walks: where rays come from, who meets items that are no triangles, and where hits go.

@@ -3,7 +3,7 @@
 //! scales with the numbers, so that it holds at every scene scale (Pharr, Jakob and Humphreys, *PBRT*
 //! 4th ed., 6.8.6).
 
-use glam::Vec3;
+use crate::lanes::{Ints as _, Lanes, Vec3};
 
 /// γ_n = nε / (1 − nε) with half the machine epsilon: a bound on n roundings (Higham 2002).
 pub const fn gamma(n: u32) -> f32 {
@@ -13,14 +13,16 @@ pub const fn gamma(n: u32) -> f32 {
 
 /// `position`, known within ±`error` on each axis, moved off its surface to the side to which
 /// `direction` points; `normal` has unit length.
-#[inline]
-pub fn offset(position: Vec3, error: Vec3, normal: Vec3, direction: Vec3) -> Vec3 {
+#[inline(always)]
+pub fn offset<F: Lanes>(
+    position: Vec3<F>,
+    error: Vec3<F>,
+    normal: Vec3<F>,
+    direction: Vec3<F>,
+) -> Vec3<F> {
     let distance = normal.abs().dot(error);
-    let shift = if direction.dot(normal) < 0.0 {
-        -distance * normal
-    } else {
-        distance * normal
-    };
+    let away = F::select(direction.dot(normal).lt(F::zero()), -distance, distance);
+    let shift = normal * away;
     let moved = position + shift;
     Vec3::new(
         outward(moved.x, shift.x),
@@ -29,21 +31,17 @@ pub fn offset(position: Vec3, error: Vec3, normal: Vec3, direction: Vec3) -> Vec
     )
 }
 
-/// The next number after `p` on the side of `shift`'s sign; `p` itself where there is no shift. Without a branch, for
-/// signs cannot be foretold.
-#[inline]
-fn outward(p: f32, shift: f32) -> f32 {
-    let sign = shift.to_bits() & SIGN;
-    let bits = p.to_bits();
-    let next = if sign == bits & SIGN {
-        bits.wrapping_add(1)
-    } else {
-        bits.wrapping_sub(1)
-    };
+/// The next number after `p` on the side of `shift`'s sign; `p` itself where there is no shift.
+#[inline(always)]
+fn outward<F: Lanes>(p: F, shift: F) -> F {
+    let (bits, one) = (p.to_bits(), F::Int::splat(1));
+    let sign = shift.to_bits() & F::Int::splat(SIGN);
+    let alike = sign.eq(bits & F::Int::splat(SIGN));
+    let next = F::select(alike, (bits + one).from_bits(), (bits - one).from_bits());
     // Zero has two signs, and is left for the least number.
-    let next = if p == 0.0 { sign | 1 } else { next };
-    let stays = shift == 0.0 || !p.is_finite();
-    f32::from_bits(if stays { bits } else { next })
+    let next = F::select(p.eq(F::zero()), (sign | one).from_bits(), next);
+    let stays = shift.eq(F::zero()) | !p.is_finite();
+    F::select(stays, p, next)
 }
 
 const SIGN: u32 = 1 << 31;
@@ -67,7 +65,7 @@ mod tests {
         ];
         for p in numbers.into_iter().flat_map(|p| [p, -p]) {
             for shift in [tiny, 1.0, f32::INFINITY] {
-                let expected = if p.is_finite() {
+                let expected = if f32::is_finite(p) {
                     [p.next_up(), p.next_down()]
                 } else {
                     [p; 2]

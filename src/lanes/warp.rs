@@ -1,68 +1,70 @@
 //! Maps from the unit square to the shapes that are sampled, each with its density. Formulas after
 //! Pharr, Jakob and Humphreys, *Physically Based Rendering* (4th ed., 2023), appendix A.5.
 
-use glam::{Vec2, Vec3};
-use std::f32::consts::{FRAC_1_PI, FRAC_PI_4, PI, TAU};
+use std::f32::consts::{FRAC_1_PI, FRAC_PI_4, TAU};
+
+use super::elementary::sin_cos_small;
+use super::{Lanes, Vec2, Vec3, sin_cos_turns};
 
 /// Uniform on the unit disc, strata kept together (Shirley and Chiu's concentric map, 1997).
-#[inline]
-pub fn concentric_disk(u: Vec2) -> Vec2 {
-    let p = 2.0 * u - Vec2::ONE;
-    if p == Vec2::ZERO {
-        return Vec2::ZERO;
-    }
-    let (r, theta) = if p.x.abs() > p.y.abs() {
-        (p.x, FRAC_PI_4 * p.y / p.x)
-    } else {
-        (p.y, FRAC_PI_4 * (2.0 - p.x / p.y))
-    };
-    r * Vec2::new(theta.cos(), theta.sin())
+#[inline(always)]
+pub fn concentric_disk<F: Lanes>(u: Vec2<F>) -> Vec2<F> {
+    let (x, y) = (u.x + u.x - F::one(), u.y + u.y - F::one());
+    let wide = y.abs().lt(x.abs());
+    let r = F::select(wide, x, y);
+    let ratio = F::select(wide, y / x, x / y);
+    // The centre has no direction.
+    let ratio = F::select(r.eq(F::zero()), F::zero(), ratio);
+    let (sin, cos) = sin_cos_small(ratio * F::splat(FRAC_PI_4));
+    Vec2::new(r * F::select(wide, cos, sin), r * F::select(wide, sin, cos))
 }
 
 /// Directions over z > 0 with density [`cosine_hemisphere_pdf`].
-#[inline]
-pub fn cosine_hemisphere(u: Vec2) -> Vec3 {
+#[inline(always)]
+pub fn cosine_hemisphere<F: Lanes>(u: Vec2<F>) -> Vec3<F> {
     let p = concentric_disk(u);
-    p.extend((1.0 - p.length_squared()).max(0.0).sqrt())
+    let z2 = F::one() - p.length_squared();
+    p.extend(z2.max(F::zero()).sqrt())
 }
 
 /// cos θ / π, 0 below.
-#[inline]
-pub fn cosine_hemisphere_pdf(cos_theta: f32) -> f32 {
-    cos_theta.max(0.0) * FRAC_1_PI
+#[inline(always)]
+pub fn cosine_hemisphere_pdf<F: Lanes>(cos_theta: F) -> F {
+    cos_theta.max(F::zero()) * F::splat(FRAC_1_PI)
 }
 
 /// Uniform on the unit sphere, density 1/4π.
-#[inline]
-pub fn uniform_sphere(u: Vec2) -> Vec3 {
-    let z = 1.0 - 2.0 * u.x;
-    let r = (1.0 - z * z).max(0.0).sqrt();
-    let (sin, cos) = (TAU * u.y).sin_cos();
+#[inline(always)]
+pub fn uniform_sphere<F: Lanes>(u: Vec2<F>) -> Vec3<F> {
+    let z = F::one() - u.x - u.x;
+    let r = (F::one() - z * z).max(F::zero()).sqrt();
+    let (sin, cos) = sin_cos_turns(u.y);
     Vec3::new(r * cos, r * sin, z)
 }
 
 /// Barycentric coordinates of the second and third corner, uniform on a triangle (Heitz's fold, 2019).
-#[inline]
-pub fn uniform_triangle(u: Vec2) -> Vec2 {
-    if u.x < u.y {
-        let b = 0.5 * u.x;
-        Vec2::new(b, u.y - b)
-    } else {
-        let b = 0.5 * u.y;
-        Vec2::new(u.x - b, b)
-    }
+#[inline(always)]
+pub fn uniform_triangle<F: Lanes>(u: Vec2<F>) -> Vec2<F> {
+    let half = F::splat(0.5) * u.x.min(u.y);
+    let first = u.x.lt(u.y);
+    Vec2::new(
+        F::select(first, half, u.x - half),
+        F::select(first, u.y - half, half),
+    )
 }
 
 /// Density of the directions within θ_max of an axis, 1 / (2π (1 − cos θ_max)), by 1 − cos θ_max: the cosine
 /// itself rounds to 1 for small cones.
-#[inline]
-pub fn uniform_cone_pdf(one_minus_cos: f32) -> f32 {
-    1.0 / (2.0 * PI * one_minus_cos)
+#[inline(always)]
+pub fn uniform_cone_pdf<F: Lanes>(one_minus_cos: F) -> F {
+    F::one() / (F::splat(TAU) * one_minus_cos)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    type Vec2 = super::Vec2<f32>;
 
     /// The mean of `f` over a midpoint grid of the unit square.
     fn mean(f: impl Fn(Vec2) -> f64) -> f64 {
@@ -90,9 +92,13 @@ mod tests {
 
     #[test]
     fn warped_directions_have_unit_length() {
-        for u in [Vec2::ZERO, Vec2::splat(0.5), Vec2::new(0.999_999_94, 0.3)] {
+        for u in [
+            Vec2::splat(0.0),
+            Vec2::splat(0.5),
+            Vec2::new(0.999_999_94, 0.3),
+        ] {
             for d in [cosine_hemisphere(u), uniform_sphere(u)] {
-                assert!((d.length() - 1.0).abs() < 1e-5, "{u} {d}");
+                assert!((d.length() - 1.0).abs() < 1e-5, "{u:?} {d:?}");
             }
         }
     }

@@ -1,0 +1,302 @@
+//! Numbers in lanes: one operation for many paths at once.
+//!
+//! What is written over [`Lanes`] is written once, and reads as it would for single numbers, with `select` in place
+//! of `if`. It is compiled for each set of instructions: for AVX-512 over sixteen lanes, for AVX2 over eight, and for
+//! every processor over one, the plain [`f32`]. A lane's value never depends on another lane's, and no operation but
+//! those of IEEE 754 is used (none is fused), so that all give the same bits.
+//!
+//! The types of other widths are known to this module alone: generic code comes to them through [`Kernel::run`], which
+//! has asked the processor. That is what makes their operations safe to call.
+//!
+//! Everything that is written over lanes must be `#[inline(always)]`, closures avoided: a function that is called, and
+//! not expanded, where the instructions are known is compiled without them, and is an order of magnitude slower.
+//! [`Lanes::call`] is the way to call one: it begins a function that knows the instructions again.
+
+mod elementary;
+mod frame;
+mod kernel;
+mod single;
+mod vector;
+pub mod warp;
+#[cfg(target_arch = "x86_64")]
+mod x86;
+
+use std::fmt::Debug;
+use std::ops::{Add, BitAnd, BitOr, BitXor, Div, Index, IndexMut, Mul, Neg, Not, Sub};
+
+pub use elementary::{acos, atan2, erf, erf_inverse, exp, ln, sin_cos, sin_cos_turns};
+pub use frame::Frame;
+pub use kernel::{Kernel, Set};
+pub use vector::{Vec2, Vec3};
+
+/// No lanes are more.
+pub const MAX_LANES: usize = 16;
+
+/// Something to be done over lanes of some width. `run` must be `#[inline(always)]`.
+pub trait Task {
+    /// What comes of it.
+    type Output;
+
+    /// Does it.
+    fn run<F: Lanes>(self) -> Self::Output;
+}
+
+/// The same where the width is known already. `run` must be `#[inline(always)]`.
+pub trait Call<F> {
+    /// What comes of it.
+    type Output;
+
+    /// Does it.
+    fn run(self) -> Self::Output;
+}
+
+/// Single-precision numbers, one a lane.
+pub trait Lanes:
+    Copy
+    + Debug
+    + Send
+    + Sync
+    + 'static
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+{
+    /// How many lanes.
+    const WIDTH: usize;
+    /// A number for each lane: the way in and out.
+    type Row: Copy + Debug + Index<usize, Output = f32> + IndexMut<usize>;
+    /// Zeros.
+    const ROW: Self::Row;
+    /// As many integers.
+    type Int: Ints<Float = Self, Mask = Self::Mask>;
+    /// As many answers.
+    type Mask: Mask;
+    /// As many numbers of double precision.
+    type Double: Doubles<Float = Self, Mask = Self::Mask>;
+
+    /// Does `call` in a function of its own that knows the instructions.
+    fn call<T: Call<Self>>(call: T) -> T::Output;
+
+    /// The same number in all lanes.
+    fn splat(value: f32) -> Self;
+    /// The numbers of a row.
+    fn load(row: &Self::Row) -> Self;
+    /// To a row.
+    fn store(self, row: &mut Self::Row);
+    /// One lane's number.
+    fn lane(self, lane: usize) -> f32;
+
+    /// The square root.
+    fn sqrt(self) -> Self;
+    /// Without its sign.
+    fn abs(self) -> Self;
+    /// The greatest integer that is not above.
+    fn floor(self) -> Self;
+    /// `self` where it is less, else `other`.
+    fn min(self, other: Self) -> Self;
+    /// `self` where it is greater, else `other`.
+    fn max(self, other: Self) -> Self;
+
+    /// Where it is less.
+    fn lt(self, other: Self) -> Self::Mask;
+    /// Where it is less or equal.
+    fn le(self, other: Self) -> Self::Mask;
+    /// Where it is equal.
+    fn eq(self, other: Self) -> Self::Mask;
+    /// `yes` where the mask is set, else `no`.
+    fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
+
+    /// Its bits.
+    fn to_bits(self) -> Self::Int;
+    /// Without its fraction; within ±2³¹.
+    fn to_int(self) -> Self::Int;
+    /// In double precision.
+    fn widen(self) -> Self::Double;
+
+    /// A row of its lanes.
+    #[inline(always)]
+    fn row(self) -> Self::Row {
+        let mut row = Self::ROW;
+        self.store(&mut row);
+        row
+    }
+    /// Nothing.
+    #[inline(always)]
+    fn zero() -> Self {
+        Self::splat(0.0)
+    }
+    /// One.
+    #[inline(always)]
+    fn one() -> Self {
+        Self::splat(1.0)
+    }
+    /// Where it is greater.
+    #[inline(always)]
+    fn gt(self, other: Self) -> Self::Mask {
+        other.lt(self)
+    }
+    /// Where it is greater or equal.
+    #[inline(always)]
+    fn ge(self, other: Self) -> Self::Mask {
+        other.le(self)
+    }
+    /// Between `least` and `most`; what is no number becomes `least`.
+    #[inline(always)]
+    fn clamp(self, least: f32, most: f32) -> Self {
+        self.max(Self::splat(least)).min(Self::splat(most))
+    }
+    /// Its square.
+    #[inline(always)]
+    fn squared(self) -> Self {
+        self * self
+    }
+    /// Where it is finite.
+    #[inline(always)]
+    fn is_finite(self) -> Self::Mask {
+        self.abs().lt(Self::splat(f32::INFINITY))
+    }
+    /// With the sign of another.
+    #[inline(always)]
+    fn copysign(self, sign: Self) -> Self {
+        let bit = Self::Int::splat(SIGN);
+        let magnitude = self.to_bits() & !bit;
+        (magnitude | (sign.to_bits() & bit)).from_bits()
+    }
+    /// A number for each lane.
+    #[inline(always)]
+    fn from_fn(mut number: impl FnMut(usize) -> f32) -> Self {
+        let mut row = Self::ROW;
+        for lane in 0..Self::WIDTH {
+            row[lane] = number(lane);
+        }
+        Self::load(&row)
+    }
+}
+
+/// The bit that is a number's sign.
+const SIGN: u32 = 1 << 31;
+
+/// Integers of 32 bits, one a lane, that wrap around.
+pub trait Ints:
+    Copy
+    + Debug
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + BitAnd<Output = Self>
+    + BitOr<Output = Self>
+    + BitXor<Output = Self>
+    + Not<Output = Self>
+{
+    /// As many numbers.
+    type Float;
+    /// As many answers.
+    type Mask;
+
+    /// An integer for each lane.
+    type Row: Copy + Debug + Index<usize, Output = u32>;
+
+    /// The same in all lanes.
+    fn splat(value: u32) -> Self;
+    /// The integers of a row.
+    fn load(row: &Self::Row) -> Self;
+    /// To a row.
+    fn store(self, row: &mut Self::Row);
+    /// With zeros from below.
+    fn shl<const N: u32>(self) -> Self;
+    /// With zeros from above.
+    fn shr<const N: u32>(self) -> Self;
+    /// Where it is equal.
+    fn eq(self, other: Self) -> Self::Mask;
+    /// Where it is less, as numbers with a sign.
+    fn lt(self, other: Self) -> Self::Mask;
+    /// As a number, which has a sign.
+    fn to_float(self) -> Self::Float;
+    /// The number with these bits.
+    #[expect(clippy::wrong_self_convention)]
+    fn from_bits(self) -> Self::Float;
+}
+
+/// Yes or no, one a lane.
+pub trait Mask:
+    Copy
+    + Debug
+    + BitAnd<Output = Self>
+    + BitOr<Output = Self>
+    + BitXor<Output = Self>
+    + Not<Output = Self>
+{
+    /// From a bit a lane.
+    fn from_bits(bits: u32) -> Self;
+    /// A bit a lane.
+    fn to_bits(self) -> u32;
+
+    /// Whether any lane says yes.
+    #[inline(always)]
+    fn any(self) -> bool {
+        self.to_bits() != 0
+    }
+    /// The lanes that say yes, ascending.
+    #[inline(always)]
+    fn lanes(self) -> LanesOf {
+        LanesOf(self.to_bits())
+    }
+    /// In all lanes the same.
+    #[inline(always)]
+    fn splat(value: bool) -> Self {
+        Self::from_bits(if value { u32::MAX } else { 0 })
+    }
+}
+
+/// The lanes of a [`Mask`].
+#[derive(Clone, Copy, Debug)]
+pub struct LanesOf(u32);
+
+impl Iterator for LanesOf {
+    type Item = usize;
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<usize> {
+        let lane = self.0.trailing_zeros() as usize;
+        self.0 &= self.0.wrapping_sub(1);
+        (lane < 32).then_some(lane)
+    }
+}
+
+/// Double-precision numbers, one a lane.
+pub trait Doubles:
+    Copy
+    + Debug
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+{
+    /// As many of single precision.
+    type Float;
+    /// As many answers.
+    type Mask;
+
+    /// The same in all lanes.
+    fn splat(value: f64) -> Self;
+    /// The square root.
+    fn sqrt(self) -> Self;
+    /// Without its sign.
+    fn abs(self) -> Self;
+    /// `self` where it is less, else `other`.
+    fn min(self, other: Self) -> Self;
+    /// `self` where it is greater, else `other`.
+    fn max(self, other: Self) -> Self;
+    /// Where it is less.
+    fn lt(self, other: Self) -> Self::Mask;
+    /// `yes` where the mask is set, else `no`.
+    fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
+    /// In single precision.
+    fn narrow(self) -> Self::Float;
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,177 @@
+//! One lane: plain numbers, on every processor.
+
+use super::{Call, Doubles, Ints, Lanes, Mask};
+
+impl Lanes for f32 {
+    const WIDTH: usize = 1;
+    const ROW: [f32; 1] = [0.0; 1];
+    type Row = [f32; 1];
+    type Int = u32;
+    type Mask = bool;
+    type Double = f64;
+
+    #[inline(always)]
+    fn call<T: Call<Self>>(call: T) -> T::Output {
+        call.run()
+    }
+
+    #[inline(always)]
+    fn splat(value: f32) -> Self {
+        value
+    }
+    #[inline(always)]
+    fn load(row: &Self::Row) -> Self {
+        row[0]
+    }
+    #[inline(always)]
+    fn store(self, row: &mut Self::Row) {
+        row[0] = self;
+    }
+    #[inline(always)]
+    fn lane(self, _lane: usize) -> f32 {
+        self
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        f32::sqrt(self)
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        f32::abs(self)
+    }
+    #[inline(always)]
+    fn floor(self) -> Self {
+        f32::floor(self)
+    }
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        if self < other { self } else { other }
+    }
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        if self > other { self } else { other }
+    }
+
+    #[inline(always)]
+    fn lt(self, other: Self) -> bool {
+        self < other
+    }
+    #[inline(always)]
+    fn le(self, other: Self) -> bool {
+        self <= other
+    }
+    #[inline(always)]
+    fn eq(self, other: Self) -> bool {
+        self == other
+    }
+    #[inline(always)]
+    fn select(mask: bool, yes: Self, no: Self) -> Self {
+        if mask { yes } else { no }
+    }
+
+    #[inline(always)]
+    fn to_bits(self) -> u32 {
+        f32::to_bits(self)
+    }
+    #[inline(always)]
+    fn to_int(self) -> u32 {
+        self as i32 as u32
+    }
+    #[inline(always)]
+    fn widen(self) -> f64 {
+        self.into()
+    }
+}
+
+impl Ints for u32 {
+    type Row = [u32; 1];
+    type Float = f32;
+    type Mask = bool;
+
+    #[inline(always)]
+    fn splat(value: u32) -> Self {
+        value
+    }
+    #[inline(always)]
+    fn load(row: &[u32; 1]) -> Self {
+        row[0]
+    }
+    #[inline(always)]
+    fn store(self, row: &mut [u32; 1]) {
+        row[0] = self;
+    }
+    #[inline(always)]
+    fn shl<const N: u32>(self) -> Self {
+        self << N
+    }
+    #[inline(always)]
+    fn shr<const N: u32>(self) -> Self {
+        self >> N
+    }
+    #[inline(always)]
+    fn eq(self, other: Self) -> bool {
+        self == other
+    }
+    #[inline(always)]
+    fn lt(self, other: Self) -> bool {
+        self.cast_signed() < other.cast_signed()
+    }
+    #[inline(always)]
+    fn to_float(self) -> f32 {
+        self.cast_signed() as f32
+    }
+    #[inline(always)]
+    fn from_bits(self) -> f32 {
+        f32::from_bits(self)
+    }
+}
+
+impl Mask for bool {
+    #[inline(always)]
+    fn from_bits(bits: u32) -> Self {
+        bits & 1 == 1
+    }
+    #[inline(always)]
+    fn to_bits(self) -> u32 {
+        self.into()
+    }
+}
+
+impl Doubles for f64 {
+    type Float = f32;
+    type Mask = bool;
+
+    #[inline(always)]
+    fn splat(value: f64) -> Self {
+        value
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        f64::sqrt(self)
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        f64::abs(self)
+    }
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        if self < other { self } else { other }
+    }
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        if self > other { self } else { other }
+    }
+    #[inline(always)]
+    fn lt(self, other: Self) -> bool {
+        self < other
+    }
+    #[inline(always)]
+    fn select(mask: bool, yes: Self, no: Self) -> Self {
+        if mask { yes } else { no }
+    }
+    #[inline(always)]
+    fn narrow(self) -> f32 {
+        self as f32
+    }
+}

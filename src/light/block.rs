@@ -1,0 +1,170 @@
+//! Lights in lanes: directions from a block of points toward one light.
+
+use super::Light;
+use crate::color::{ColorModel, Spectra, Spectral};
+use crate::lanes::{Call, Lanes, Mask as _, Vec2, Vec3};
+
+/// Directions drawn toward a light; the fields are those of [`super::LightSample`].
+#[derive(Clone, Copy, Debug)]
+pub struct LightSamples<F: Lanes, S> {
+    /// World space, unit length.
+    pub direction: Vec3<F>,
+    /// Where the light is, if it is not `distant`.
+    pub target: Vec3<F>,
+    /// Where it is infinitely far.
+    pub distant: F::Mask,
+    /// Radiance from there (of a delta light: the irradiance at right angles), not divided by the density.
+    pub radiance: S,
+    /// Density per solid angle in 1/sr; 1 for a delta light, 0 where nothing arrives.
+    pub pdf: F,
+    /// Where it is a point or a direction that no path meets by chance.
+    pub delta: F::Mask,
+}
+
+impl<F: Lanes, S: Spectra<F>> LightSamples<F, S> {
+    /// No light.
+    #[inline(always)]
+    pub fn none() -> Self {
+        Self {
+            direction: Vec3::splat(0.0),
+            target: Vec3::splat(0.0),
+            distant: F::Mask::splat(false),
+            radiance: S::zero(),
+            pdf: F::zero(),
+            delta: F::Mask::splat(false),
+        }
+    }
+
+    /// `yes` where the mask is set, else `no`.
+    #[inline(always)]
+    pub fn select(mask: F::Mask, yes: Self, no: Self) -> Self {
+        Self {
+            direction: Vec3::select(mask, yes.direction, no.direction),
+            target: Vec3::select(mask, yes.target, no.target),
+            distant: (mask & yes.distant) | (!mask & no.distant),
+            radiance: S::select(mask, yes.radiance, no.radiance),
+            pdf: F::select(mask, yes.pdf, no.pdf),
+            delta: (mask & yes.delta) | (!mask & no.delta),
+        }
+    }
+}
+
+/// A light that is written over lanes. Wavelengths are given from the first lane on.
+pub(super) trait BlockEmitter<C: ColorModel> {
+    /// [`super::Emitter::sample`] for the lanes that are `active`; what the others get is not used.
+    fn sample_lanes<F: Lanes>(
+        &self,
+        from: Vec3<F>,
+        u: Vec2<F>,
+        w: &[C::Wavelengths],
+        active: F::Mask,
+    ) -> LightSamples<F, C::Columns<F>>;
+}
+
+/// The arguments of [`BlockEmitter::sample_lanes`] of a light.
+struct Draw<'a, C: ColorModel, F: Lanes> {
+    light: &'a Light<C>,
+    from: Vec3<F>,
+    u: Vec2<F>,
+    w: &'a [C::Wavelengths],
+    active: F::Mask,
+}
+
+impl<C: ColorModel, F: Lanes> Call<F> for Draw<'_, C, F> {
+    type Output = LightSamples<F, C::Columns<F>>;
+
+    #[inline(always)]
+    fn run(self) -> Self::Output {
+        let Self {
+            light,
+            from,
+            u,
+            w,
+            active,
+        } = self;
+        match light {
+            Light::Area(area) if area.is_even() => area.sample_lanes(from, u, w, active),
+            Light::Constant(constant) => constant.sample_lanes(from, u, w, active),
+            Light::Envmap(envmap) => envmap.sample_lanes(from, u, w, active),
+            other => sample_each(other, from, u, w, active),
+        }
+    }
+}
+
+impl<C: ColorModel> Light<C> {
+    /// Directions from the points `from` toward the light, for the lanes that are `active`.
+    #[inline(always)]
+    pub fn sample_lanes<F: Lanes>(
+        &self,
+        from: Vec3<F>,
+        u: Vec2<F>,
+        w: &[C::Wavelengths],
+        active: F::Mask,
+    ) -> LightSamples<F, C::Columns<F>> {
+        F::call(Draw {
+            light: self,
+            from,
+            u,
+            w,
+            active,
+        })
+    }
+}
+
+/// Directions toward a light that is asked lane by lane.
+#[inline(always)]
+fn sample_each<C: ColorModel, F: Lanes>(
+    light: &Light<C>,
+    from: Vec3<F>,
+    u: Vec2<F>,
+    w: &[C::Wavelengths],
+    active: F::Mask,
+) -> LightSamples<F, C::Columns<F>> {
+    let there = active.to_bits();
+    let (mut direction, mut target, mut pdf) = ([F::ROW; 3], [F::ROW; 3], F::ROW);
+    let (mut distant, mut delta) = (0, 0);
+    let radiance = Spectra::from_samples(|lane| {
+        let sample = if there >> lane & 1 == 1 {
+            light.sample(from.lane(lane), u.lane(lane), &w[lane])
+        } else {
+            None
+        };
+        let Some(sample) = sample else {
+            return C::Sample::zero();
+        };
+        for axis in 0..3 {
+            direction[axis][lane] = sample.direction[axis];
+            target[axis][lane] = sample.target.unwrap_or_default()[axis];
+        }
+        distant |= u32::from(sample.target.is_none()) << lane;
+        delta |= u32::from(sample.delta) << lane;
+        pdf[lane] = sample.pdf;
+        sample.radiance
+    });
+    LightSamples {
+        direction: Vec3::<F>::load(&direction),
+        target: Vec3::<F>::load(&target),
+        distant: F::Mask::from_bits(distant),
+        radiance,
+        pdf: F::load(&pdf),
+        delta: F::Mask::from_bits(delta),
+    }
+}
+
+/// The face for a single point of a light that is written over lanes.
+pub(super) fn single_sample<C: ColorModel, E: BlockEmitter<C>>(
+    emitter: &E,
+    from: glam::Vec3,
+    u: glam::Vec2,
+    w: &C::Wavelengths,
+) -> Option<super::LightSample<C::Sample>> {
+    let w = std::slice::from_ref(w);
+    let samples = emitter.sample_lanes::<f32>(from.into(), u.into(), w, true);
+    (samples.pdf > 0.0).then(|| super::LightSample {
+        direction: samples.direction.into(),
+        target: (!samples.distant).then(|| samples.target.into()),
+        radiance: samples.radiance.sample(0),
+        pdf: samples.pdf,
+        delta: samples.delta,
+    })
+}

@@ -1,0 +1,389 @@
+//! Materials in lanes: what a block of paths meets, all of one material. A material that is written over lanes is
+//! written once: its face for single points is the same code with one lane. Those that are not yet are asked lane by
+//! lane.
+
+use super::{Bsdf, BsdfSample, BsdfValue, Material};
+use crate::color::{ColorModel, Spectra, Spectral};
+use crate::interaction::Points;
+use crate::lanes::{Call, Lanes, Mask as _, Vec2, Vec3};
+
+/// A BSDF's values, without delta parts; black with density 0 where there is none.
+#[derive(Clone, Copy, Debug)]
+pub struct BsdfValues<F, S> {
+    /// f·|cos θ_o|.
+    pub value: S,
+    /// The density with which `wo` is drawn, in 1/sr.
+    pub pdf: F,
+}
+
+/// Directions drawn from a BSDF; the fields are those of [`BsdfSample`].
+#[derive(Clone, Copy, Debug)]
+pub struct BsdfSamples<F: Lanes, S> {
+    /// Where a direction was drawn; the other lanes hold anything.
+    pub drawn: F::Mask,
+    /// Local, unit length.
+    pub wo: Vec3<F>,
+    /// f·|cos θ_o| over the density.
+    pub weight: S,
+    /// Density per solid angle in 1/sr; of a delta direction, the probability of its choice.
+    pub pdf: F,
+    /// Index of refraction on the side of `wo` over that on the side of `wi`; 1 for a reflection.
+    pub eta: F,
+    /// Where no other direction would do.
+    pub delta: F::Mask,
+    /// Where it goes straight on as if nothing were there.
+    pub null: F::Mask,
+}
+
+impl<F: Lanes, S: Spectra<F>> BsdfValues<F, S> {
+    /// None.
+    #[inline(always)]
+    pub(super) fn none() -> Self {
+        Self {
+            value: S::zero(),
+            pdf: F::zero(),
+        }
+    }
+
+    /// These where the mask is set, else none.
+    #[inline(always)]
+    pub(super) fn only(self, mask: F::Mask) -> Self {
+        Self::select(mask, self, Self::none())
+    }
+
+    /// `yes` where the mask is set, else `no`.
+    #[inline(always)]
+    pub(super) fn select(mask: F::Mask, yes: Self, no: Self) -> Self {
+        Self {
+            value: S::select(mask, yes.value, no.value),
+            pdf: F::select(mask, yes.pdf, no.pdf),
+        }
+    }
+
+    /// The samples that drew `wo` with this density, where that is above 0.
+    #[inline(always)]
+    pub(super) fn as_samples(self, wo: Vec3<F>, eta: F) -> BsdfSamples<F, S> {
+        let none = F::Mask::splat(false);
+        BsdfSamples {
+            drawn: F::zero().lt(self.pdf) & self.pdf.is_finite(),
+            wo,
+            weight: self.value * (F::one() / self.pdf),
+            pdf: self.pdf,
+            eta,
+            delta: none,
+            null: none,
+        }
+    }
+}
+
+impl<F: Lanes, S: Spectra<F>> BsdfSamples<F, S> {
+    /// A mirror's.
+    #[inline(always)]
+    pub(super) fn delta(drawn: F::Mask, wo: Vec3<F>, weight: S, probability: F) -> Self {
+        Self {
+            drawn,
+            wo,
+            weight,
+            pdf: probability,
+            eta: F::one(),
+            delta: F::Mask::splat(true),
+            null: F::Mask::splat(false),
+        }
+    }
+
+    /// Straight on through the surface, chosen with that probability.
+    #[inline(always)]
+    pub(super) fn passing(wi: Vec3<F>, probability: F, weight: S) -> Self {
+        let all = F::Mask::splat(true);
+        Self {
+            null: all,
+            ..Self::delta(all, -wi, weight, probability)
+        }
+    }
+
+    /// `yes` where the mask is set, else `no`.
+    #[inline(always)]
+    pub(super) fn select(mask: F::Mask, yes: Self, no: Self) -> Self {
+        let either = |yes: F::Mask, no: F::Mask| (mask & yes) | (!mask & no);
+        Self {
+            drawn: either(yes.drawn, no.drawn),
+            wo: Vec3::select(mask, yes.wo, no.wo),
+            weight: S::select(mask, yes.weight, no.weight),
+            pdf: F::select(mask, yes.pdf, no.pdf),
+            eta: F::select(mask, yes.eta, no.eta),
+            delta: either(yes.delta, no.delta),
+            null: either(yes.null, no.null),
+        }
+    }
+}
+
+/// A material that is written over lanes. Wavelengths are given from the first lane on.
+pub(super) trait BlockBsdf<C: ColorModel> {
+    /// [`Bsdf::eval`].
+    fn eval_lanes<F: Lanes>(
+        &self,
+        at: &Points<'_, F>,
+        wi: Vec3<F>,
+        wo: Vec3<F>,
+        w: &[C::Wavelengths],
+    ) -> BsdfValues<F, C::Columns<F>>;
+
+    /// [`Bsdf::sample`].
+    fn sample_lanes<F: Lanes>(
+        &self,
+        at: &Points<'_, F>,
+        wi: Vec3<F>,
+        u1: F,
+        u2: Vec2<F>,
+        w: &[C::Wavelengths],
+    ) -> BsdfSamples<F, C::Columns<F>>;
+}
+
+/// The face for single points of a material that is written over lanes.
+macro_rules! single_face {
+    () => {
+        fn eval(
+            &self,
+            at: &crate::interaction::Interaction<'_>,
+            wi: glam::Vec3,
+            wo: glam::Vec3,
+            w: &C::Wavelengths,
+        ) -> Option<crate::material::BsdfValue<C::Sample>> {
+            crate::material::block::single_value::<C, _>(self, at, wi, wo, w)
+        }
+
+        fn sample(
+            &self,
+            at: &crate::interaction::Interaction<'_>,
+            wi: glam::Vec3,
+            u1: f32,
+            u2: glam::Vec2,
+            w: &C::Wavelengths,
+        ) -> Option<crate::material::BsdfSample<C::Sample>> {
+            crate::material::block::single_sample::<C, _>(self, at, wi, (u1, u2), w)
+        }
+    };
+}
+pub(super) use single_face;
+
+/// See [`single_face`].
+pub(super) fn single_value<C: ColorModel, B: BlockBsdf<C>>(
+    bsdf: &B,
+    at: &crate::interaction::Interaction<'_>,
+    wi: glam::Vec3,
+    wo: glam::Vec3,
+    w: &C::Wavelengths,
+) -> Option<BsdfValue<C::Sample>> {
+    let points = Points::one(at);
+    let values = bsdf.eval_lanes::<f32>(&points, wi.into(), wo.into(), std::slice::from_ref(w));
+    let there = values.pdf > 0.0 || !values.value.is_black();
+    there.then(|| BsdfValue {
+        value: values.value.sample(0),
+        pdf: values.pdf,
+    })
+}
+
+/// See [`single_face`].
+pub(super) fn single_sample<C: ColorModel, B: BlockBsdf<C>>(
+    bsdf: &B,
+    at: &crate::interaction::Interaction<'_>,
+    wi: glam::Vec3,
+    (u1, u2): (f32, glam::Vec2),
+    w: &C::Wavelengths,
+) -> Option<BsdfSample<C::Sample>> {
+    let points = Points::one(at);
+    let w = std::slice::from_ref(w);
+    let samples = bsdf.sample_lanes::<f32>(&points, wi.into(), u1, u2.into(), w);
+    samples.drawn.then(|| BsdfSample {
+        wo: samples.wo.into(),
+        weight: samples.weight.sample(0),
+        pdf: samples.pdf,
+        eta: samples.eta,
+        delta: samples.delta,
+        null: samples.null,
+    })
+}
+
+/// The arguments of [`BlockBsdf::eval_lanes`] of a material.
+struct Eval<'a, C: ColorModel, F: Lanes> {
+    material: &'a Material<C>,
+    at: &'a Points<'a, F>,
+    wi: Vec3<F>,
+    wo: Vec3<F>,
+    w: &'a [C::Wavelengths],
+}
+
+impl<C: ColorModel, F: Lanes> Call<F> for Eval<'_, C, F> {
+    type Output = BsdfValues<F, C::Columns<F>>;
+
+    #[inline(always)]
+    fn run(self) -> Self::Output {
+        let Self {
+            material,
+            at,
+            wi,
+            wo,
+            w,
+        } = self;
+        match material {
+            Material::Conductor(_) | Material::Dielectric(_) => BsdfValues::none(),
+            Material::Diffuse(m) => m.eval_lanes(at, wi, wo, w),
+            Material::Mask(m) => m.eval_lanes(at, wi, wo, w),
+            Material::Plastic(m) => m.eval_lanes(at, wi, wo, w),
+            Material::RoughConductor(m) => m.eval_lanes(at, wi, wo, w),
+            Material::RoughPlastic(m) => m.eval_lanes(at, wi, wo, w),
+            Material::TwoSided(m) => m.eval_lanes(at, wi, wo, w),
+            other => eval_each::<C, F>(&**other, at, wi, wo, w),
+        }
+    }
+}
+
+/// The arguments of [`BlockBsdf::sample_lanes`] of a material.
+struct Draw<'a, C: ColorModel, F: Lanes> {
+    material: &'a Material<C>,
+    at: &'a Points<'a, F>,
+    wi: Vec3<F>,
+    u1: F,
+    u2: Vec2<F>,
+    w: &'a [C::Wavelengths],
+}
+
+impl<C: ColorModel, F: Lanes> Call<F> for Draw<'_, C, F> {
+    type Output = BsdfSamples<F, C::Columns<F>>;
+
+    #[inline(always)]
+    fn run(self) -> Self::Output {
+        let Self {
+            material,
+            at,
+            wi,
+            u1,
+            u2,
+            w,
+        } = self;
+        match material {
+            Material::Conductor(m) => m.sample_lanes(at, wi, u1, u2, w),
+            Material::Dielectric(m) => m.sample_lanes(at, wi, u1, u2, w),
+            Material::Diffuse(m) => m.sample_lanes(at, wi, u1, u2, w),
+            Material::Mask(m) => m.sample_lanes(at, wi, u1, u2, w),
+            Material::Plastic(m) => m.sample_lanes(at, wi, u1, u2, w),
+            Material::RoughConductor(m) => m.sample_lanes(at, wi, u1, u2, w),
+            Material::RoughPlastic(m) => m.sample_lanes(at, wi, u1, u2, w),
+            Material::TwoSided(m) => m.sample_lanes(at, wi, u1, u2, w),
+            other => sample_each::<C, F>(&**other, at, wi, u1, u2, w),
+        }
+    }
+}
+
+impl<C: ColorModel> Material<C> {
+    /// The values and densities of pairs of directions.
+    #[inline(always)]
+    pub fn eval_lanes<F: Lanes>(
+        &self,
+        at: &Points<'_, F>,
+        wi: Vec3<F>,
+        wo: Vec3<F>,
+        w: &[C::Wavelengths],
+    ) -> BsdfValues<F, C::Columns<F>> {
+        F::call(Eval {
+            material: self,
+            at,
+            wi,
+            wo,
+            w,
+        })
+    }
+
+    /// Draws directions: `u1` chooses the lobe, `u2` the direction.
+    #[inline(always)]
+    pub fn sample_lanes<F: Lanes>(
+        &self,
+        at: &Points<'_, F>,
+        wi: Vec3<F>,
+        u1: F,
+        u2: Vec2<F>,
+        w: &[C::Wavelengths],
+    ) -> BsdfSamples<F, C::Columns<F>> {
+        F::call(Draw {
+            material: self,
+            at,
+            wi,
+            u1,
+            u2,
+            w,
+        })
+    }
+}
+
+/// The values of a material that is asked lane by lane.
+#[inline(always)]
+fn eval_each<C: ColorModel, F: Lanes>(
+    bsdf: &dyn Bsdf<C>,
+    at: &Points<'_, F>,
+    wi: Vec3<F>,
+    wo: Vec3<F>,
+    w: &[C::Wavelengths],
+) -> BsdfValues<F, C::Columns<F>> {
+    let (there, mut pdf) = (at.active.to_bits(), F::ROW);
+    let value = Spectra::from_samples(|lane| {
+        let value = if there >> lane & 1 == 1 {
+            bsdf.eval(&at.lane(lane), wi.lane(lane), wo.lane(lane), &w[lane])
+        } else {
+            None
+        };
+        match value {
+            Some(value) => {
+                pdf[lane] = value.pdf;
+                value.value
+            }
+            None => C::Sample::zero(),
+        }
+    });
+    BsdfValues {
+        value,
+        pdf: F::load(&pdf),
+    }
+}
+
+/// Directions drawn from a material that is asked lane by lane.
+#[inline(always)]
+fn sample_each<C: ColorModel, F: Lanes>(
+    bsdf: &dyn Bsdf<C>,
+    at: &Points<'_, F>,
+    wi: Vec3<F>,
+    u1: F,
+    u2: Vec2<F>,
+    w: &[C::Wavelengths],
+) -> BsdfSamples<F, C::Columns<F>> {
+    let there = at.active.to_bits();
+    let (mut drawn, mut delta, mut null) = (0, 0, 0);
+    let (mut wo, mut pdf, mut eta) = ([F::ROW; 3], F::ROW, F::ROW);
+    let weight = Spectra::from_samples(|lane| {
+        let sample = if there >> lane & 1 == 1 {
+            let (u1, u2) = (u1.lane(lane), u2.lane(lane));
+            bsdf.sample(&at.lane(lane), wi.lane(lane), u1, u2, &w[lane])
+        } else {
+            None
+        };
+        let Some(sample) = sample else {
+            return C::Sample::zero();
+        };
+        drawn |= 1 << lane;
+        delta |= u32::from(sample.delta) << lane;
+        null |= u32::from(sample.null) << lane;
+        for (row, value) in wo.iter_mut().zip(sample.wo.to_array()) {
+            row[lane] = value;
+        }
+        (pdf[lane], eta[lane]) = (sample.pdf, sample.eta);
+        sample.weight
+    });
+    BsdfSamples {
+        drawn: F::Mask::from_bits(drawn),
+        wo: Vec3::<F>::load(&wo),
+        weight,
+        pdf: F::load(&pdf),
+        eta: F::load(&eta),
+        delta: F::Mask::from_bits(delta),
+        null: F::Mask::from_bits(null),
+    }
+}
