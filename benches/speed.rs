@@ -9,7 +9,7 @@ use std::sync::{Arc, OnceLock};
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
-use etendue::accel::{Counts, Method, Tracer};
+use etendue::accel::{Counts, Method, Order, Tracer};
 use etendue::description::{self, Description, Kind};
 use etendue::interaction::{Hit, Ray};
 use etendue::lanes::warp;
@@ -72,7 +72,7 @@ fn ray(origin: Vec3, direction: Vec3, t_max: f32) -> Ray {
 fn incoherent() -> Vec<Ray> {
     let rays = primary();
     let mut hits = Vec::new();
-    tracer().closest(&rays, &mut hits, &mut Counts::default());
+    tracer().closest(&rays, Order::Any, &mut hits, &mut Counts::default());
     rays.iter()
         .zip(&hits)
         .filter(|(_, hit)| !hit.is_miss())
@@ -98,7 +98,14 @@ fn closest(bencher: Bencher<'_, '_>, rays: &[Ray]) {
     let mut hits: Vec<Hit> = Vec::new();
     bencher
         .counter(ItemsCount::new(rays.len()))
-        .bench_local(|| tracer().closest(black_box(rays), &mut hits, &mut Counts::default()));
+        .bench_local(|| {
+            tracer().closest(
+                black_box(rays),
+                Order::Any,
+                &mut hits,
+                &mut Counts::default(),
+            )
+        });
 }
 
 #[divan::bench(sample_count = 20)]
@@ -117,7 +124,12 @@ fn occluded_shadow(bencher: Bencher<'_, '_>) {
     bencher
         .counter(ItemsCount::new(rays.len()))
         .bench_local(|| {
-            tracer().occluded(black_box(&rays), &mut blocked, &mut Counts::default());
+            tracer().occluded(
+                black_box(&rays),
+                Order::Any,
+                &mut blocked,
+                &mut Counts::default(),
+            );
         });
 }
 

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use etendue::accel::{Counts, Method, Tracer};
+use etendue::accel::{Counts, Method, Order, Tracer};
 use etendue::interaction::{Hit, Ray};
 use etendue::shape::Geometry;
 
@@ -43,10 +43,12 @@ impl Peer for Ours {
     }
 
     fn closest(&self, batch: &Batch<'_>, hits: &mut Vec<Hit>) {
-        self.0.closest(batch.rays, hits, &mut Counts::default());
+        self.0
+            .closest(batch.rays, Order::Any, hits, &mut Counts::default());
     }
 
     fn occluded(&self, rays: &[Ray], blocked: &mut Vec<bool>) {
-        self.0.occluded(rays, blocked, &mut Counts::default());
+        self.0
+            .occluded(rays, Order::Any, blocked, &mut Counts::default());
     }
 }

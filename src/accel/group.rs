@@ -292,6 +292,7 @@ pub(super) struct Group {
     unbounded: Vec<Item>,
     /// All others for brute force; those that are no triangles for a tree.
     items: Vec<Item>,
+    has_instances: bool,
     tree: Tree,
     bounds: Bounds,
     /// Boxes that together hold what the tree holds; the world has none.
@@ -318,6 +319,7 @@ impl Group {
         };
         let group = Self {
             items: items.into_iter().map(|item| members.item(item)).collect(),
+            has_instances: !members.boxes().is_empty(),
             unbounded: members.unbounded,
             tree,
             bounds,
@@ -334,6 +336,11 @@ impl Group {
     /// What the tree holds, for brute force; else those of it that are no triangles.
     pub(super) fn items(&self) -> &[Item] {
         &self.items
+    }
+
+    /// Whether instances stand in it.
+    pub(super) fn has_instances(&self) -> bool {
+        self.has_instances
     }
 
     pub(super) fn tree(&self) -> &Tree {

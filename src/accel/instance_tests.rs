@@ -46,7 +46,7 @@ fn rays(seed: u64, count: u32) -> Vec<Ray> {
 
 fn closest(tracer: &Tracer, rays: &[Ray]) -> Vec<Hit> {
     let (mut hits, mut counts) = (Vec::new(), Counts::default());
-    tracer.closest(rays, &mut hits, &mut counts);
+    tracer.closest(rays, Order::Any, &mut hits, &mut counts);
     hits
 }
 

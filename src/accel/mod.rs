@@ -44,6 +44,16 @@ impl Counts {
     }
 }
 
+/// What is known of the rays of a batch. It changes no hit, but how they are found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Order {
+    /// Nothing: each is walked by itself.
+    #[default]
+    Any,
+    /// Those that follow one another go much the same way, as a camera's do: they are walked in packets.
+    Coherent,
+}
+
 /// How rays find shapes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Method {
@@ -224,17 +234,23 @@ impl Tracer {
     }
 
     /// The first hit of each ray, in the order of the rays. A ray that is not finite meets nothing.
-    pub fn closest(&self, rays: &[Ray], hits: &mut Vec<Hit>, counts: &mut Counts) {
+    pub fn closest(&self, rays: &[Ray], order: Order, hits: &mut Vec<Hit>, counts: &mut Counts) {
         hits.clear();
         hits.extend(rays.iter().map(|ray| Hit::miss(ray.t_max)));
-        Walk::new(self, counts).closest(rays, hits);
+        Walk::new(self, counts).closest(rays, order, hits);
     }
 
     /// Whether anything lies on each ray, in the order of the rays.
-    pub fn occluded(&self, rays: &[Ray], blocked: &mut Vec<bool>, counts: &mut Counts) {
+    pub fn occluded(
+        &self,
+        rays: &[Ray],
+        order: Order,
+        blocked: &mut Vec<bool>,
+        counts: &mut Counts,
+    ) {
         blocked.clear();
         blocked.resize(rays.len(), false);
-        Walk::new(self, counts).occluded(rays, blocked);
+        Walk::new(self, counts).occluded(rays, order, blocked);
     }
 
     /// What a hit looks like; `hit` came from `ray`.

@@ -63,7 +63,7 @@ fn ray(origin: Vec3, direction: Vec3) -> Ray {
 
 fn meet<'t>(tracer: &'t Tracer, ray: &Ray) -> Option<Interaction<'t>> {
     let (mut hits, mut counts) = (Vec::new(), Counts::default());
-    tracer.closest(&[*ray], &mut hits, &mut counts);
+    tracer.closest(&[*ray], Order::Any, &mut hits, &mut counts);
     (!hits[0].is_miss()).then(|| tracer.interaction(ray, &hits[0]))
 }
 

@@ -67,12 +67,12 @@ pub(super) fn agree(tracers: &[Tracer], rays: &[Ray]) -> usize {
         ..*r
     });
     let limited: Vec<Ray> = limited.collect();
-    let found = |tracer: &Tracer| {
+    let found = |tracer: &Tracer, order: Order| {
         let (mut hits, mut limited_hits, mut blocked) = (Vec::new(), Vec::new(), Vec::new());
         let mut counts = Counts::default();
-        tracer.closest(rays, &mut hits, &mut counts);
-        tracer.closest(&limited, &mut limited_hits, &mut counts);
-        tracer.occluded(&limited, &mut blocked, &mut counts);
+        tracer.closest(rays, order, &mut hits, &mut counts);
+        tracer.closest(&limited, order, &mut limited_hits, &mut counts);
+        tracer.occluded(&limited, order, &mut blocked, &mut counts);
         for (hit, blocked) in limited_hits.iter().zip(&blocked) {
             assert_eq!(*blocked, !hit.is_miss());
         }
@@ -84,13 +84,16 @@ pub(super) fn agree(tracers: &[Tracer], rays: &[Ray]) -> usize {
         let met = hits.iter().filter(|h| !h.is_miss()).count();
         (bits, met, counts)
     };
-    let brute = found(&tracers[0]);
-    let trees: Vec<_> = tracers[1..].iter().map(found).collect();
-    for (tracer, (bits, _, counts)) in tracers[1..].iter().zip(&trees) {
-        for (i, (a, b)) in brute.0.iter().zip(bits).enumerate() {
-            assert_eq!(a, b, "{} and brute force, ray {i}", tracer.kernel.name());
+    let brute = found(&tracers[0], Order::Any);
+    for order in [Order::Any, Order::Coherent] {
+        let trees: Vec<_> = tracers[1..].iter().map(|t| found(t, order)).collect();
+        for (tracer, (bits, _, counts)) in tracers[1..].iter().zip(&trees) {
+            let name = tracer.kernel.name();
+            for (i, (a, b)) in brute.0.iter().zip(bits).enumerate() {
+                assert_eq!(a, b, "{name} and brute force, ray {i}, {order:?}");
+            }
+            assert_eq!(*counts, trees[0].2, "{name}, {order:?}");
         }
-        assert_eq!(*counts, trees[0].2, "{}", tracer.kernel.name());
     }
     brute.1
 }
@@ -124,7 +127,7 @@ fn exhaustive_rays_are_held_against_everything_and_find_the_same() {
     let asked = [Method::Brute, Method::Exhaustive].map(|method| {
         let tracer = Tracer::new(shapes.to_vec(), &[0], Vec::new(), method);
         let (mut blocked, mut counts) = (Vec::new(), Counts::default());
-        tracer.occluded(&rays, &mut blocked, &mut counts);
+        tracer.occluded(&rays, Order::Any, &mut blocked, &mut counts);
         (blocked, counts.primitive_tests)
     });
     assert!(asked[0].0.contains(&true) && asked[0].0 == asked[1].0);
@@ -151,7 +154,7 @@ fn the_work_on_a_tree_changes_no_hit() {
             },
         );
         let (mut hits, mut counts) = (Vec::new(), Counts::default());
-        tracer.closest(&rays, &mut hits, &mut counts);
+        tracer.closest(&rays, Order::Any, &mut hits, &mut counts);
         (hits, counts.node_steps)
     });
     assert!(found.iter().all(|(hits, _)| *hits == found[0].0));
@@ -316,7 +319,7 @@ fn equal_triangles_by_the_hundred_thousand_build_in_a_moment() {
         time: 0.0,
     };
     let (mut hits, mut counts) = (Vec::new(), Counts::default());
-    tracer.closest(&[ray], &mut hits, &mut counts);
+    tracer.closest(&[ray], Order::Any, &mut hits, &mut counts);
     assert_eq!(hits[0].primitive, 0, "ties go to the lowest primitive");
 }
 
@@ -346,7 +349,7 @@ fn a_closed_mesh_has_no_hole_at_vertices_and_edges() {
         })
         .collect();
     let (mut hits, mut counts) = (Vec::new(), Counts::default());
-    tracer.closest(&rays, &mut hits, &mut counts);
+    tracer.closest(&rays, Order::Any, &mut hits, &mut counts);
     assert_eq!(hits.iter().filter(|h| h.is_miss()).count(), 0);
 }
 
@@ -384,7 +387,7 @@ fn a_ray_never_meets_the_surface_that_it_leaves() {
                     time: 0.0,
                 };
                 let (mut hits, mut counts) = (Vec::new(), Counts::default());
-                tracer.closest(&[ray], &mut hits, &mut counts);
+                tracer.closest(&[ray], Order::Any, &mut hits, &mut counts);
                 assert!(!hits[0].is_miss());
                 let at = tracer.interaction(&ray, &hits[0]);
                 // Upward, half of them within a thousandth of the horizon.
@@ -397,7 +400,7 @@ fn a_ray_never_meets_the_surface_that_it_leaves() {
                     Vec3::new(up.x, up.y, 1e-3 * up.z).normalize()
                 };
                 let leaving = at.spawn(at.frame.to_world(up));
-                tracer.closest(&[leaving], &mut hits, &mut counts);
+                tracer.closest(&[leaving], Order::Any, &mut hits, &mut counts);
                 again += usize::from(!hits[0].is_miss());
             }
             assert_eq!(again, 0, "scale 1e{decade}, turn {turn}, shift {shift}");

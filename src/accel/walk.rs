@@ -10,7 +10,7 @@ use super::boxes::RayBoxes;
 use super::group::Item;
 use super::triangle::Shear;
 use super::wide::{Best, Met, Place, Start, Visit, Walker};
-use super::{Counts, Instance, Method, Tracer, to_local};
+use super::{Counts, Instance, Method, Order, Tracer, to_local};
 
 /// See the module.
 pub(super) struct Walk<'t> {
@@ -45,19 +45,19 @@ impl<'t> Walk<'t> {
     }
 
     /// Improves each ray's hit.
-    pub(super) fn closest(&mut self, rays: &[Ray], hits: &mut [Hit]) {
-        self.rays::<_, false>(WORLD, rays, hits);
+    pub(super) fn closest(&mut self, rays: &[Ray], order: Order, hits: &mut [Hit]) {
+        self.rays::<_, false>((WORLD, order), rays, hits);
     }
 
     /// Says of each ray whether anything lies on it.
-    pub(super) fn occluded(&mut self, rays: &[Ray], blocked: &mut [bool]) {
-        self.rays::<_, true>(WORLD, rays, &mut Shadows { rays, blocked });
+    pub(super) fn occluded(&mut self, rays: &[Ray], order: Order, blocked: &mut [bool]) {
+        self.rays::<_, true>((WORLD, order), rays, &mut Shadows { rays, blocked });
     }
 
     /// Meets a group: improves each ray's hit; with `ANY`, by any that is there.
     fn rays<L: Ledger + ?Sized, const ANY: bool>(
         &mut self,
-        way: Way,
+        (way, order): (Way, Order),
         rays: &[Ray],
         ledger: &mut L,
     ) {
@@ -78,6 +78,10 @@ impl<'t> Walk<'t> {
         };
         let inner_levels = tracer.inner_levels;
         let (tree, kernel, count) = (group.tree(), tracer.kernel, rays.len());
+        if order == Order::Coherent && !group.has_instances() {
+            tree.packets::<_, ANY>(kernel, &mut party, rays, &mut counts);
+            return self.counts.add(&counts);
+        }
         tree.batch::<_, ANY>(
             kernel,
             (inner_levels, tracer.is_large),
@@ -136,6 +140,7 @@ impl<'t> Walk<'t> {
         };
         let before = *best;
         let local = to_local(to_world, ray);
+        let way = (way, Order::Any);
         self.rays::<[Hit], ANY>(way, &[local], std::slice::from_mut(best));
         *best != before
     }

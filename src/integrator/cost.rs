@@ -3,7 +3,7 @@
 
 use std::time::{Duration, Instant};
 
-use crate::accel::Counts;
+use crate::accel::{Counts, Order};
 use crate::color::ColorModel;
 use crate::interaction::{Hit, Ray};
 use crate::scene::Scene;
@@ -70,7 +70,12 @@ impl Cost {
             _ => &mut stats.bounce_rays,
         };
         *kind += rays.len() as u64;
-        scene.closest(rays, hits, &mut stats.tracing);
+        // A camera's rays come pixel by pixel.
+        let order = match depth {
+            0 => Order::Coherent,
+            _ => Order::Any,
+        };
+        scene.closest(rays, order, hits, &mut stats.tracing);
         self.closest += begin.elapsed();
     }
 
@@ -85,7 +90,7 @@ impl Cost {
         let stats = &mut self.stats;
         stats.shadow_rays += rays.len() as u64;
         let mut counts = Counts::default();
-        scene.occluded(rays, blocked, &mut counts);
+        scene.occluded(rays, Order::Any, blocked, &mut counts);
         stats.tracing.add(&counts);
         stats.shadow_tracing.add(&counts);
         self.occluded += begin.elapsed();

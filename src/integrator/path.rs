@@ -63,10 +63,10 @@ struct WithRays<T> {
 }
 
 impl<T> WithRays<T> {
-    fn new() -> Self {
+    fn with_capacity(count: usize) -> Self {
         Self {
-            rays: Vec::new(),
-            things: Vec::new(),
+            rays: Vec::with_capacity(count),
+            things: Vec::with_capacity(count),
         }
     }
 
@@ -147,7 +147,9 @@ impl<C: ColorModel> Estimator<C> for Path {
         if self.limits.max_depth == 0 {
             return;
         }
-        let (mut walkers, mut next) = (WithRays::new(), WithRays::new());
+        let room = starts.len();
+        let mut walkers = WithRays::with_capacity(room);
+        let mut next = WithRays::with_capacity(room);
         for (slot, start) in (0..).zip(starts) {
             let walker = Walker {
                 throughput: scene.color().unit(),
@@ -160,7 +162,7 @@ impl<C: ColorModel> Estimator<C> for Path {
             walkers.push(start.ray, walker);
         }
         let (mut hits, mut blocked) = (Vec::new(), Vec::new());
-        let mut shadows = WithRays::new();
+        let mut shadows = WithRays::with_capacity(room);
         let mut runs = Runs::new(scene.material_count());
         for depth in 0.. {
             if walkers.things.is_empty() {

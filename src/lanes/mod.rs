@@ -3,7 +3,7 @@
 //! What is written over [`Lanes`] is written once, and reads as it would for single numbers, with `select` in place
 //! of `if`. It is compiled for each set of instructions: for AVX-512 over sixteen lanes, for AVX2 over eight, and for
 //! every processor over one, the plain [`f32`]. A lane's value never depends on another lane's, and no operation but
-//! those of IEEE 754 is used (none is fused), so that all give the same bits.
+//! those of IEEE 754 is used, so that all give the same bits.
 //!
 //! The types of other widths are known to this module alone: generic code comes to them through [`Kernel::run`], which
 //! has asked the processor. That is what makes their operations safe to call.
@@ -94,6 +94,9 @@ pub trait Lanes:
     fn abs(self) -> Self;
     /// The greatest integer that is not above.
     fn floor(self) -> Self;
+    /// `self · factor + term`, rounded once. Processors without an instruction for it take long, so that boxes alone are
+    /// met by it.
+    fn mul_add(self, factor: Self, term: Self) -> Self;
     /// `self` where it is less, else `other`.
     fn min(self, other: Self) -> Self;
     /// `self` where it is greater, else `other`.

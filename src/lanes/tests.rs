@@ -21,7 +21,7 @@ fn functions_are_those_of_double_precision() {
             |u| sin_cos_turns(u).0,
             |u| (std::f64::consts::TAU * u).sin(),
             [0.0, 1.0],
-            4e-7,
+            6e-7,
         ),
         ("acos", acos, f64::acos, [-1.0, 1.0], 4e-7),
         (
@@ -117,6 +117,7 @@ impl Task for Everything<'_> {
                 -a,
                 a.abs().sqrt(),
                 a.floor(),
+                a.mul_add(b, a),
                 a.min(b),
                 a.max(b),
                 a.clamp(-0.5, 0.5),

@@ -143,7 +143,7 @@ impl Brightness {
         let sample = if u.x < self.share {
             let u = Vec2::new((u.x / self.share).min(1f32.next_down()), u.y);
             match (&self.places, shape) {
-                (Places::Square(grid), _) => shape.chart(grid.sample(u).0)?.point,
+                (Places::Square(grid), _) => shape.chart(grid.sample(u).place)?.point,
                 (Places::Triangles(triangles), Geometry::Mesh(mesh)) => {
                     let drawn = triangles.sample(u.x);
                     mesh.triangle_point(drawn.index as u32, Vec2::new(drawn.rest, u.y))

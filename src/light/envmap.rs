@@ -117,6 +117,7 @@ impl<C: ColorModel> Envmap<C> {
         (world.normalize(), sin)
     }
 
+    #[inline(always)]
     fn radiance(&self, p: Point, wavelengths: &C::Wavelengths) -> C::Sample {
         let q = p * Vec2::new(self.width as f32, (self.height - 1) as f32);
         let x = (q.x as usize).min(self.width - 1);
@@ -176,14 +177,18 @@ impl<C: ColorModel> BlockEmitter<C> for Envmap<C> {
             return LightSamples::none();
         };
         let (mut place, mut density) = ([F::ROW; 2], F::ROW);
+        // First all cells, then all texels: so lanes wait for memory together, and not one after another.
+        for lane in active.lanes() {
+            let cell = cells.sample(u.lane(lane));
+            (place[0][lane], place[1][lane]) = (cell.place.x, cell.place.y);
+            density[lane] = cell.density;
+        }
         let there = active.to_bits();
         let radiance = Spectra::from_samples(|lane| {
             if there >> lane & 1 == 0 {
                 return C::Sample::zero();
             }
-            let (p, drawn) = cells.sample(u.lane(lane));
-            (place[0][lane], place[1][lane], density[lane]) = (p.x, p.y, drawn);
-            self.radiance(p, &w[lane])
+            self.radiance(Vec2::new(place[0][lane], place[1][lane]), &w[lane])
         });
         let (direction, sine) = self.direction(lanes::Vec2::<F>::load(&place));
         LightSamples {

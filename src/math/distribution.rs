@@ -72,132 +72,140 @@ impl Discrete {
     }
 }
 
-/// Indices drawn in proportion to weights by one look into a table (Walker, *An efficient method for generating discrete
-/// random variables with general distributions*, 1977; made as by Vose, 1991): index i of n is drawn, and with some
-/// probability exchanged for another.
-#[derive(Clone, Debug)]
-struct Alias {
-    slots: Vec<Slot>,
+/// A cell drawn from a [`Grid`].
+#[derive(Clone, Copy, Debug)]
+pub struct Cell {
+    /// A point of the unit square within.
+    pub place: Vec2,
+    /// Its density there.
+    pub density: f32,
 }
 
+/// A slot of an alias table: index i of n is drawn, and from a fraction of the slot on exchanged for another (Walker, *An
+/// efficient method for generating discrete random variables with general distributions*, 1977; made as by Vose, 1991).
+/// What is wanted of either index stands beside it, so that drawing looks at one place in memory.
 #[derive(Clone, Copy, Debug)]
 struct Slot {
-    /// From this fraction of the slot on the other index is meant.
     threshold: f32,
     other: u32,
+    /// Of the slot's own index, and of the other.
+    densities: [f32; 2],
 }
 
-impl Alias {
-    /// From weights of which at least one is positive and none negative.
-    fn new(weights: &[f64], total: f64) -> Self {
-        let scale = weights.len() as f64 / total;
-        let mut rest: Vec<f64> = weights.iter().map(|w| w * scale).collect();
-        let own = |i: usize| Slot {
-            threshold: 1.0,
-            other: i as u32,
-        };
-        let mut slots: Vec<Slot> = (0..rest.len()).map(own).collect();
-        let (mut small, mut large): (Vec<usize>, Vec<usize>) =
-            (0..rest.len()).partition(|&i| rest[i] < 1.0);
-        while let (Some(&less), Some(&more)) = (small.last(), large.last()) {
-            small.pop();
-            slots[less] = Slot {
-                threshold: rest[less] as f32,
-                other: more as u32,
-            };
-            rest[more] -= 1.0 - rest[less];
-            if rest[more] < 1.0 {
-                large.pop();
-                small.push(more);
-            }
+/// The table for weights of which at least one is positive and none negative, with a density each.
+fn alias_table(weights: &[f64], total: f64, density: impl Fn(usize) -> f32) -> Vec<Slot> {
+    let scale = weights.len() as f64 / total;
+    let mut rest: Vec<f64> = weights.iter().map(|w| w * scale).collect();
+    let slot = |i: usize, other: usize, threshold: f64| Slot {
+        threshold: threshold as f32,
+        other: other as u32,
+        densities: [density(i), density(other)],
+    };
+    let mut slots: Vec<Slot> = (0..rest.len()).map(|i| slot(i, i, 1.0)).collect();
+    let (mut small, mut large): (Vec<usize>, Vec<usize>) =
+        (0..rest.len()).partition(|&i| rest[i] < 1.0);
+    while let (Some(&less), Some(&more)) = (small.last(), large.last()) {
+        small.pop();
+        slots[less] = slot(less, more, rest[less]);
+        rest[more] -= 1.0 - rest[less];
+        if rest[more] < 1.0 {
+            large.pop();
+            small.push(more);
         }
-        // Only rounding leaves a slot without its other; where it has no weight, any that has stands for it.
-        if let Some(heaviest) =
-            (0..weights.len()).max_by(|&a, &b| weights[a].total_cmp(&weights[b]))
-        {
-            for &left in small.iter().filter(|&&i| weights[i] <= 0.0) {
-                slots[left] = Slot {
-                    threshold: 0.0,
-                    other: heaviest as u32,
-                };
-            }
-        }
-        Self { slots }
+    }
+    // Only rounding leaves a slot without its other; where it has no weight, the heaviest stands for it.
+    let heaviest = (0..weights.len()).max_by(|&a, &b| weights[a].total_cmp(&weights[b]));
+    for left in small.into_iter().filter(|&i| weights[i] <= 0.0) {
+        slots[left] = slot(left, heaviest.unwrap_or(left), 0.0);
+    }
+    slots
+}
+
+impl Slot {
+    /// The slot at `u` in [0, 1), and how far within it.
+    #[inline(always)]
+    fn at(slots: &[Self], u: f32) -> (usize, f32) {
+        let at = u * slots.len() as f32;
+        let index = (at as usize).min(slots.len() - 1);
+        (index, at - index as f32)
     }
 
-    /// An index for `u` in [0, 1), and the number stretched over its share.
-    #[inline]
-    fn sample(&self, u: f32) -> (usize, f32) {
-        let at = u * self.slots.len() as f32;
-        let first = (at as usize).min(self.slots.len() - 1);
-        let within = at - first as f32;
-        let Slot { threshold, other } = self.slots[first];
-        let (index, rest) = if within < threshold {
-            (first, within / threshold)
+    /// The index that is drawn in slot `own`, the number stretched over its share, and its density.
+    #[inline(always)]
+    fn draw(&self, own: usize, within: f32) -> (usize, f32, f32) {
+        let exchanged = within >= self.threshold;
+        let (index, rest) = if exchanged {
+            let share = 1.0 - self.threshold;
+            (self.other as usize, (within - self.threshold) / share)
         } else {
-            (other as usize, (within - threshold) / (1.0 - threshold))
+            (own, within / self.threshold)
         };
-        (index, rest.clamp(0.0, 1f32.next_down()))
+        let rest = rest.clamp(0.0, 1f32.next_down());
+        (index, rest, self.densities[usize::from(exchanged)])
     }
 }
 
-/// A density on the unit square, constant in each cell of a grid.
+/// A density on the unit square, constant in each cell of a grid. First a row is drawn, then a cell of it.
 #[derive(Clone, Debug)]
 pub struct Grid {
     width: usize,
-    rows: Alias,
-    columns: Vec<Option<Alias>>,
-    /// Of each cell, row by row.
-    densities: Vec<f32>,
+    rows: Vec<Slot>,
+    /// Row by row; a row without weight is never drawn.
+    cells: Vec<Slot>,
 }
 
 impl Grid {
     /// From `width` columns of weights, row by row; `None` where no weight is positive. Negative and non-finite weights
     /// count as 0.
     pub fn new(width: usize, weights: &[f64]) -> Option<Self> {
-        let weights: Vec<f64> = (weights.iter())
-            .map(|w| if w.is_finite() { w.max(0.0) } else { 0.0 })
-            .collect();
-        let totals: Vec<f64> = (weights.chunks_exact(width))
-            .map(|row| row.iter().sum())
-            .collect();
+        let positive = |w: &f64| if w.is_finite() { w.max(0.0) } else { 0.0 };
+        let weights: Vec<f64> = weights.iter().map(positive).collect();
+        let rows: Vec<&[f64]> = weights.chunks_exact(width).collect();
+        let totals: Vec<f64> = rows.iter().map(|row| row.iter().sum()).collect();
         let total: f64 = totals.iter().sum();
         if !(total > 0.0 && total.is_finite()) {
             return None;
         }
         let scale = weights.len() as f64 / total;
-        let columns = (weights.chunks_exact(width).zip(&totals))
-            .map(|(row, total)| (*total > 0.0).then(|| Alias::new(row, *total)));
+        let cells = rows.iter().zip(&totals).flat_map(|(row, total)| {
+            let density = |i: usize| (row[i] * scale) as f32;
+            let even = vec![1.0; width];
+            // A table that nobody looks at is still one.
+            let (weights, total) = match *total > 0.0 {
+                true => (*row, *total),
+                false => (&even[..], width as f64),
+            };
+            alias_table(weights, total, density)
+        });
         Some(Self {
             width,
-            rows: Alias::new(&totals, total),
-            columns: columns.collect(),
-            densities: weights.iter().map(|w| (w * scale) as f32).collect(),
+            cells: cells.collect(),
+            rows: alias_table(&totals, total, |_| 0.0),
         })
     }
 
-    /// A point of the unit square, and its density.
-    pub fn sample(&self, u: Vec2) -> (Vec2, f32) {
-        let (row, y) = self.rows.sample(u.y);
-        let Some(columns) = &self.columns[row] else {
-            unreachable!("a drawn row has weight");
-        };
-        let (column, x) = columns.sample(u.x);
-        let cells = Vec2::new(self.width as f32, self.columns.len() as f32);
-        let p = Vec2::new(column as f32 + x, row as f32 + y) / cells;
-        let density = self.densities[row * self.width + column];
-        (p.min(Vec2::splat(1f32.next_down())), density)
+    /// A cell for `u` in [0, 1)².
+    #[inline(always)]
+    pub fn sample(&self, u: Vec2) -> Cell {
+        let (slot, within) = Slot::at(&self.rows, u.y);
+        let (row, y, _) = self.rows[slot].draw(slot, within);
+        let cells = &self.cells[row * self.width..][..self.width];
+        let (slot, within) = Slot::at(cells, u.x);
+        let (column, x, density) = cells[slot].draw(slot, within);
+        let size = Vec2::new(self.width as f32, self.rows.len() as f32);
+        let place = Vec2::new(column as f32 + x, row as f32 + y) / size;
+        Cell {
+            place: place.min(Vec2::splat(1f32.next_down())),
+            density,
+        }
     }
 
     /// The density at `p` in [0, 1)².
     pub fn pdf(&self, p: Vec2) -> f32 {
         let cell = |x: f32, n: usize| ((x * n as f32).max(0.0) as usize).min(n - 1);
-        let (row, column) = (cell(p.y, self.columns.len()), cell(p.x, self.width));
-        self.densities[row * self.width + column]
+        let (row, column) = (cell(p.y, self.rows.len()), cell(p.x, self.width));
+        self.cells[row * self.width + column].densities[0]
     }
-
-    /// Bytes that a cell takes.
-    pub const CELL: usize = size_of::<Slot>() + size_of::<f32>();
 }
 
 #[cfg(test)]
@@ -231,7 +239,10 @@ mod tests {
                     random::unit(random::bits(5, i)),
                     random::unit(random::bits(6, i)),
                 );
-                let (p, pdf) = grid.sample(u);
+                let Cell {
+                    place: p,
+                    density: pdf,
+                } = grid.sample(u);
                 assert!((grid.pdf(p) - pdf).abs() < 1e-4 * pdf);
                 1.0 / f64::from(pdf)
             })

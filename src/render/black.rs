@@ -3,7 +3,7 @@
 use glam::Vec2;
 
 use super::prepare::Job;
-use crate::accel::Counts;
+use crate::accel::{Counts, Order};
 use crate::color::ColorModel;
 use crate::description::{Description, Kind};
 use crate::error::{Error, Problem};
@@ -95,7 +95,8 @@ fn sees_something<C: ColorModel>(job: &Job<'_, C>) -> bool {
         .map(|(x, y)| ray(x, y))
         .collect();
     let mut hits: Vec<Hit> = Vec::new();
-    job.scene.closest(&rays, &mut hits, &mut Counts::default());
+    job.scene
+        .closest(&rays, Order::Any, &mut hits, &mut Counts::default());
     hits.iter().any(|hit| !hit.is_miss())
 }
 

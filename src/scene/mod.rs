@@ -9,7 +9,7 @@ mod files;
 
 use glam::{Vec2, Vec3};
 
-use crate::accel::{Counts, Tracer};
+use crate::accel::{Counts, Order, Tracer};
 use crate::color::{ColorModel, Spectral};
 use crate::error::Problem;
 use crate::interaction::{Hit, Interaction, Ray};
@@ -114,13 +114,19 @@ impl<C: ColorModel> Scene<C> {
     }
 
     /// The first hit of each ray.
-    pub fn closest(&self, rays: &[Ray], hits: &mut Vec<Hit>, counts: &mut Counts) {
-        self.tracer.closest(rays, hits, counts);
+    pub fn closest(&self, rays: &[Ray], order: Order, hits: &mut Vec<Hit>, counts: &mut Counts) {
+        self.tracer.closest(rays, order, hits, counts);
     }
 
     /// Whether anything lies on each ray.
-    pub fn occluded(&self, rays: &[Ray], blocked: &mut Vec<bool>, counts: &mut Counts) {
-        self.tracer.occluded(rays, blocked, counts);
+    pub fn occluded(
+        &self,
+        rays: &[Ray],
+        order: Order,
+        blocked: &mut Vec<bool>,
+        counts: &mut Counts,
+    ) {
+        self.tracer.occluded(rays, order, blocked, counts);
     }
 
     /// What a hit looks like.

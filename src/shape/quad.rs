@@ -312,7 +312,7 @@ mod tests {
             (40.0, 10.0, 5.0),
             (0.1, 5.0, 30.0),
             (1.2, 0.5, 0.02),
-            (-0.5, 0.5, 0.004),
+            (-0.5, 0.5, 0.05),
         ] {
             let from = quad.corner + x * quad.size.x * along + y * quad.size.y * up + n * away;
             let Some(seen) = seen(&quad, from) else {

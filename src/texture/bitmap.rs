@@ -32,6 +32,10 @@ impl Wrap {
     /// The texel that stands for index `i` of `n`, wherever `i` lies.
     fn apply(self, i: i64, n: usize) -> usize {
         let n = n as i64;
+        // As a rule it lies inside, and a division takes long.
+        if (0..n).contains(&i) {
+            return i as usize;
+        }
         let wrapped = match self {
             Self::Repeat => i.rem_euclid(n),
             Self::Clamp => i.clamp(0, n - 1),
@@ -134,24 +138,44 @@ impl<C: ColorModel> Bitmap<C> {
     }
 
     /// The four texels around a point.
+    #[inline(always)]
     fn cell(&self, uv: Vec2, wavelengths: &C::Wavelengths) -> Cell<C::Sample> {
         let p = transformed(&self.to_uv, uv) * self.size() - 0.5;
         let corner = p.floor();
         let (x, y) = (corner.x as i64, corner.y as i64);
-        let row = |y| [x, x.saturating_add(1)].map(|x| self.texel(x, y, wavelengths));
-        Cell {
-            corners: [y, y.saturating_add(1)].map(row),
-            f: p - corner,
-        }
-    }
-
-    fn texel(&self, x: i64, y: i64, wavelengths: &C::Wavelengths) -> C::Sample {
         let Texels {
             width,
             height,
             texels,
         } = &*self.texels;
-        let (x, y) = (self.wrap.apply(x, *width), self.wrap.apply(y, *height));
+        let (left, right) = (
+            self.wrap.apply(x, *width),
+            self.wrap.apply(x.saturating_add(1), *width),
+        );
+        let (upper, lower) = (
+            self.wrap.apply(y, *height) * width,
+            self.wrap.apply(y.saturating_add(1), *height) * width,
+        );
+        let texel = |at: usize| C::evaluate_texel(&texels[at], wavelengths);
+        Cell {
+            corners: [
+                [texel(upper + left), texel(upper + right)],
+                [texel(lower + left), texel(lower + right)],
+            ],
+            f: p - corner,
+        }
+    }
+
+    /// The texel at a point.
+    fn nearest(&self, uv: Vec2, wavelengths: &C::Wavelengths) -> C::Sample {
+        let Texels {
+            width,
+            height,
+            texels,
+        } = &*self.texels;
+        let p = (transformed(&self.to_uv, uv) * self.size()).floor();
+        let x = self.wrap.apply(p.x as i64, *width);
+        let y = self.wrap.apply(p.y as i64, *height);
         C::evaluate_texel(&texels[y * width + x], wavelengths)
     }
 }
@@ -194,8 +218,7 @@ fn load<C: ColorModel>(
 impl<C: ColorModel> Pattern<C> for Bitmap<C> {
     fn eval(&self, at: &Interaction<'_>, wavelengths: &C::Wavelengths) -> C::Sample {
         if self.nearest {
-            let p = transformed(&self.to_uv, at.uv) * self.size();
-            return self.texel(p.x.floor() as i64, p.y.floor() as i64, wavelengths);
+            return self.nearest(at.uv, wavelengths);
         }
         let Cell {
             corners: [[a, b], [c, d]],

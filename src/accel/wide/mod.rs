@@ -22,6 +22,7 @@ mod curve;
 mod huge;
 mod kernel;
 mod node;
+mod packet;
 mod portable;
 mod sketch;
 mod sound;
@@ -34,6 +35,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::{Build, CacheUse, Counts};
+use crate::interaction::Ray;
 use crate::lanes::Kernel;
 use crate::shape::Bounds;
 use huge::Huge;
@@ -165,6 +167,25 @@ impl Tree {
         } else {
             compiled::batch::<W, ANY, false>(kernel, self, walker, count, flight, counts);
         }
+    }
+}
+
+impl Tree {
+    /// Walks `rays`, which the walker has too, in packets through this tree, in which no instances stand.
+    pub(super) fn packets<'t, W: Walker<'t>, const ANY: bool>(
+        &'t self,
+        kernel: Kernel,
+        walker: &mut W,
+        rays: &[Ray],
+        counts: &mut Counts,
+    ) {
+        let tree = self;
+        kernel.run(packet::Packets::<W, ANY> {
+            tree,
+            walker,
+            rays,
+            counts,
+        });
     }
 }
 

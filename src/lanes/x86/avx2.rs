@@ -151,6 +151,11 @@ impl Lanes for F32x8 {
         unsafe { Self(_mm256_floor_ps(self.0)) }
     }
     #[inline(always)]
+    fn mul_add(self, factor: Self, term: Self) -> Self {
+        // SAFETY: see the module.
+        unsafe { Self(_mm256_fmadd_ps(self.0, factor.0, term.0)) }
+    }
+    #[inline(always)]
     fn min(self, other: Self) -> Self {
         // SAFETY: see the module.
         unsafe { Self(_mm256_min_ps(self.0, other.0)) }
