@@ -384,3 +384,120 @@ impl<C: ColorModel> Scatter<'_, C> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path;
+
+    use super::*;
+    use crate::accel::Method;
+    use crate::color::{Bands, Rgb};
+    use crate::description::{self, Description, Kind};
+    use crate::integrator::Integrator;
+    use crate::lanes::Kernel;
+    use crate::math::random;
+    use crate::scene::{self, Assets};
+
+    /// Surfaces, textures, lights and materials of many kinds, some in lanes and some asked one by one.
+    const SCENE: &str = "<scene version='3.0.0'>
+        <integrator type='path'><integer name='rr_depth' value='3'/></integrator>
+        <emitter type='constant'><rgb name='radiance' value='.2, .3, .4'/></emitter>
+        <emitter type='point'><point name='position' value='0, 3, 1'/></emitter>
+        <shape type='rectangle'><transform name='to_world'><scale value='.5'/><rotate x='1' angle='90'/>
+            <translate y='2.5'/></transform><emitter type='area'/></shape>
+        <shape type='sphere'><point name='center' value='2, 1, 0'/><float name='radius' value='.3'/>
+            <emitter type='area'/></shape>
+        <shape type='cube'><transform name='to_world'><scale value='.2'/><translate x='-2' y='1'/></transform>
+            <emitter type='area'/></shape>
+        <shape type='rectangle'><transform name='to_world'><scale value='4'/><rotate x='1' angle='-90'/>
+            </transform><bsdf type='diffuse'><texture name='reflectance' type='checkerboard'>
+            <transform name='to_uv'><scale value='6'/></transform></texture></bsdf></shape>
+        <shape type='sphere'><point name='center' value='-1, .5, 0'/><float name='radius' value='.5'/>
+            <bsdf type='dielectric'/></shape>
+        <shape type='sphere'><point name='center' value='0, .4, .3'/><float name='radius' value='.4'/>
+            <bsdf type='roughplastic'><float name='alpha' value='.2'/></bsdf></shape>
+        <shape type='disk'><transform name='to_world'><translate z='-1' y='.8'/></transform>
+            <bsdf type='twosided'><bsdf type='roughconductor'><string name='material' value='Cu'/></bsdf></bsdf></shape>
+        <shape type='cube'><transform name='to_world'><scale value='.3'/><translate x='1' y='.3' z='.5'/></transform>
+            <bsdf type='mask'><float name='opacity' value='.6'/><bsdf type='plastic'/></bsdf></shape>
+        <shape type='cylinder'><point name='p0' value='.5, 0, -.5'/><point name='p1' value='.5, 1, -.5'/>
+            <float name='radius' value='.2'/><bsdf type='principled'/></shape>
+        </scene>";
+
+    fn scene<C: ColorModel>(color: C) -> (Description, Scene<C>) {
+        let options = description::Options::default();
+        let text = Description::parse(SCENE, path::Path::new("test.xml"), &options).unwrap();
+        let assets = Assets::load(&text, None, None, &|| ()).unwrap();
+        let scene = scene::build(&text, &assets, color, Method::Tree).unwrap();
+        (text, scene)
+    }
+
+    /// What `count` rays into the scene come to, which meet all kinds of surfaces in no order.
+    fn bits<C: ColorModel>(scene: &Scene<C>, text: &Description, count: u32) -> Vec<u32> {
+        let properties = &text.root().children(Kind::Integrator)[0];
+        let integrator = Integrator::<C>::build(properties, &Context::default()).unwrap();
+        let number = |key, i| random::unit(random::bits(key, i));
+        let starts = (0..count).map(|i| {
+            let origin = glam::Vec3::new(4.0 * number(1, i) - 2.0, 1.5, 4.0);
+            let target = glam::Vec3::new(5.0 * number(2, i) - 2.5, 2.5 * number(3, i), 0.0);
+            Start {
+                ray: Ray {
+                    origin,
+                    direction: (target - origin).normalize(),
+                    t_max: f32::INFINITY,
+                    time: 0.0,
+                },
+                wavelengths: scene.color().wavelengths(|| number(4, i)),
+                stream: Stream::new(0, i, 0, 0),
+            }
+        });
+        let starts: Vec<Start<C>> = starts.collect();
+        let mut estimates = Estimates {
+            values: Vec::new(),
+            extra: Vec::new(),
+        };
+        let sampler = Sampler::default();
+        integrator.estimate(
+            scene,
+            &sampler,
+            &starts,
+            &mut estimates,
+            &mut Cost::default(),
+        );
+        let of_one = |estimate: &Estimate<C::Sample>| {
+            let radiance = estimate.radiance;
+            let channels = (0..C::Sample::LANES).map(move |c| radiance[c].to_bits());
+            channels.chain([estimate.alpha.to_bits()])
+        };
+        estimates.values.iter().flat_map(of_one).collect()
+    }
+
+    #[test]
+    fn every_kernel_sees_the_same_bits() {
+        let (text, mut scene) = scene(Rgb);
+        let mut expected = None;
+        for kernel in Kernel::all() {
+            scene = scene.with_kernel(kernel);
+            let found = bits(&scene, &text, 3000);
+            let lit = found.iter().filter(|bits| **bits != 0).count();
+            assert!(lit > 10_000, "{lit}");
+            let expected = expected.get_or_insert_with(|| found.clone());
+            assert!(found == *expected, "{}", kernel.name());
+        }
+    }
+
+    /// Which paths share a block does not matter to any of them.
+    #[test]
+    fn a_path_comes_to_the_same_bits_whatever_its_company() {
+        let (text, scene) = scene(Rgb);
+        let many = bits(&scene, &text, 1500);
+        for count in [1, 7, 400] {
+            let few = bits(&scene, &text, count);
+            assert!(few == many[..few.len()], "{count}");
+        }
+        let (text, scene) = self::scene(Bands::<8>::new(5).unwrap());
+        let many = bits(&scene, &text, 300);
+        let few = bits(&scene, &text, 20);
+        assert!(few == many[..few.len()]);
+    }
+}

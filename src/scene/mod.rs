@@ -13,7 +13,7 @@ use crate::accel::{Counts, Order, Tracer};
 use crate::color::{ColorModel, Spectral};
 use crate::error::Problem;
 use crate::interaction::{Hit, Interaction, Ray};
-use crate::lanes::{self, Lanes, MAX_LANES, Mask as _};
+use crate::lanes::{self, Kernel, Lanes, MAX_LANES, Mask as _};
 use crate::light::{Light, LightSample, LightSamples};
 use crate::material::Material;
 
@@ -81,6 +81,15 @@ impl<C: ColorModel> Scene<C> {
     /// The shapes.
     pub fn tracer(&self) -> &Tracer {
         &self.tracer
+    }
+
+    /// The same with other instructions; what is seen is the same to the bit.
+    #[must_use]
+    pub fn with_kernel(self, kernel: Kernel) -> Self {
+        Self {
+            tracer: self.tracer.with_kernel(kernel),
+            ..self
+        }
     }
 
     /// How many lights there are.

@@ -36,6 +36,8 @@ struct Packet<F: Lanes> {
     entering: Vec3<F>,
     leaving: Vec3<F>,
     backward: [F::Mask; 3],
+    /// The octant of the directions, a bit an axis, where all have the same.
+    octant: Option<usize>,
     /// Along the shear's axes.
     sheared_origin: Vec3<F>,
     shear: [F; 2],
@@ -113,10 +115,26 @@ impl<F: Lanes> Packet<F> {
                 is_z & !back,
                 is_z & back,
             ],
+            octant: None,
             limit: zero,
             id: F::Int::splat(0),
             place: F::Int::splat(0),
         }
+    }
+
+    /// The octant of the rays with these bits, where all have the same.
+    #[inline(always)]
+    fn common_octant(&self, rays: u32) -> Option<usize> {
+        let mut octant = 0;
+        for (axis, backward) in self.backward.iter().enumerate() {
+            let backward = backward.to_bits() & rays;
+            if backward == rays {
+                octant |= 1 << axis;
+            } else if backward != 0 {
+                return None;
+            }
+        }
+        Some(octant)
     }
 
     /// The component `axes[0]` of those that go mostly along x, `axes[1]` along y, `axes[2]` along z.
@@ -126,30 +144,34 @@ impl<F: Lanes> Packet<F> {
         F::select(is_x, v[axes[0]], F::select(is_y, v[axes[1]], v[axes[2]]))
     }
 
-    /// Where planes are entered and left along an axis, of boxes from `low` to `high`.
-    #[inline(always)]
-    fn slab(&self, axis: usize, low: F, high: F, entering: F, leaving: F, inverse: F) -> [F; 2] {
-        let (first, last) = (
-            F::select(self.backward[axis], high, low),
-            F::select(self.backward[axis], low, high),
-        );
-        [
-            first.mul_add(inverse, entering),
-            last.mul_add(inverse, leaving),
-        ]
-    }
-
     /// Where the rays enter a box, and where they leave it, widened; slabs as in a node.
     #[inline(always)]
     fn enter(&self, slabs: [f32; 6]) -> [F; 2] {
-        let s = slabs;
-        let splat = F::splat;
+        let mut first = [F::zero(); 3];
+        let mut last = [F::zero(); 3];
+        if let Some(octant) = self.octant {
+            for axis in 0..3 {
+                let back = octant >> axis & 1;
+                first[axis] = F::splat(slabs[2 * axis + back]);
+                last[axis] = F::splat(slabs[2 * axis + 1 - back]);
+            }
+        } else {
+            for axis in 0..3 {
+                let (low, high) = (F::splat(slabs[2 * axis]), F::splat(slabs[2 * axis + 1]));
+                first[axis] = F::select(self.backward[axis], high, low);
+                last[axis] = F::select(self.backward[axis], low, high);
+            }
+        }
         let (e, l, i) = (self.entering, self.leaving, self.inverse);
-        let x = self.slab(0, splat(s[0]), splat(s[1]), e.x, l.x, i.x);
-        let y = self.slab(1, splat(s[2]), splat(s[3]), e.y, l.y, i.y);
-        let z = self.slab(2, splat(s[4]), splat(s[5]), e.z, l.z, i.z);
-        let near = x[0].max(y[0]).max(z[0]).max(F::zero());
-        [near, x[1].min(y[1]).min(z[1]) * splat(WIDEN)]
+        let near = first[0]
+            .mul_add(i.x, e.x)
+            .max(first[1].mul_add(i.y, e.y))
+            .max(first[2].mul_add(i.z, e.z));
+        let far = last[0]
+            .mul_add(i.x, l.x)
+            .min(last[1].mul_add(i.y, l.y))
+            .min(last[2].mul_add(i.z, l.z));
+        [near.max(F::zero()), far * F::splat(WIDEN)]
     }
 
     /// Edge functions of a triangle whose corners are given along the shear's axes.
@@ -238,6 +260,7 @@ impl<'t, W: Walker<'t>, const ANY: bool> Packets<'_, 't, W, ANY> {
         packet.limit = F::load(&limit);
         packet.id = F::load(&ids).to_bits();
         packet.place = F::load(&places).to_bits();
+        packet.octant = packet.common_octant(sound);
         self.walk(&mut packet, first, F::Mask::from_bits(sound), octant, stack);
         self.report(&packet, first, count);
     }
