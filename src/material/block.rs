@@ -119,14 +119,17 @@ impl<F: Lanes, S: Spectra<F>> BsdfSamples<F, S> {
 
 /// A material that is written over lanes. Wavelengths are given from the first lane on.
 pub(super) trait BlockBsdf<C: ColorModel> {
-    /// [`Bsdf::eval`].
+    /// [`Bsdf::eval`]; none where all lobes are single directions.
+    #[inline(always)]
     fn eval_lanes<F: Lanes>(
         &self,
-        at: &Points<'_, F>,
-        wi: Vec3<F>,
-        wo: Vec3<F>,
-        w: &[C::Wavelengths],
-    ) -> BsdfValues<F, C::Columns<F>>;
+        _at: &Points<'_, F>,
+        _wi: Vec3<F>,
+        _wo: Vec3<F>,
+        _w: &[C::Wavelengths],
+    ) -> BsdfValues<F, C::Columns<F>> {
+        BsdfValues::none()
+    }
 
     /// [`Bsdf::sample`].
     fn sample_lanes<F: Lanes>(
@@ -226,12 +229,15 @@ impl<C: ColorModel, F: Lanes> Call<F> for Eval<'_, C, F> {
             w,
         } = self;
         match material {
-            Material::Conductor(_) | Material::Dielectric(_) => BsdfValues::none(),
+            Material::Conductor(m) => m.eval_lanes(at, wi, wo, w),
+            Material::Dielectric(m) => m.eval_lanes(at, wi, wo, w),
             Material::Diffuse(m) => m.eval_lanes(at, wi, wo, w),
             Material::Mask(m) => m.eval_lanes(at, wi, wo, w),
+            Material::Null(m) => BlockBsdf::<C>::eval_lanes(m, at, wi, wo, w),
             Material::Plastic(m) => m.eval_lanes(at, wi, wo, w),
             Material::RoughConductor(m) => m.eval_lanes(at, wi, wo, w),
             Material::RoughPlastic(m) => m.eval_lanes(at, wi, wo, w),
+            Material::ThinDielectric(m) => m.eval_lanes(at, wi, wo, w),
             Material::TwoSided(m) => m.eval_lanes(at, wi, wo, w),
             other => eval_each::<C, F>(&**other, at, wi, wo, w),
         }
@@ -266,9 +272,11 @@ impl<C: ColorModel, F: Lanes> Call<F> for Draw<'_, C, F> {
             Material::Dielectric(m) => m.sample_lanes(at, wi, u1, u2, w),
             Material::Diffuse(m) => m.sample_lanes(at, wi, u1, u2, w),
             Material::Mask(m) => m.sample_lanes(at, wi, u1, u2, w),
+            Material::Null(m) => BlockBsdf::<C>::sample_lanes(m, at, wi, u1, u2, w),
             Material::Plastic(m) => m.sample_lanes(at, wi, u1, u2, w),
             Material::RoughConductor(m) => m.sample_lanes(at, wi, u1, u2, w),
             Material::RoughPlastic(m) => m.sample_lanes(at, wi, u1, u2, w),
+            Material::ThinDielectric(m) => m.sample_lanes(at, wi, u1, u2, w),
             Material::TwoSided(m) => m.sample_lanes(at, wi, u1, u2, w),
             other => sample_each::<C, F>(&**other, at, wi, u1, u2, w),
         }

@@ -2,7 +2,7 @@
 //! refraction; without either it is a perfect mirror. `specular_reflectance` (1) multiplies.
 
 use super::ior::Complex;
-use super::{BlockBsdf, Bsdf, BsdfSamples, BsdfValues, Lobes, fresnel, single_face};
+use super::{BlockBsdf, Bsdf, BsdfSamples, Lobes, fresnel, single_face};
 use crate::color::{ColorModel, Role};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, texture};
@@ -52,17 +52,6 @@ impl<C: ColorModel> Bsdf<C> for Conductor<C> {
 }
 
 impl<C: ColorModel> BlockBsdf<C> for Conductor<C> {
-    #[inline(always)]
-    fn eval_lanes<F: Lanes>(
-        &self,
-        _at: &Points<'_, F>,
-        _wi: Vec3<F>,
-        _wo: Vec3<F>,
-        _w: &[C::Wavelengths],
-    ) -> BsdfValues<F, C::Columns<F>> {
-        BsdfValues::none()
-    }
-
     #[inline(always)]
     fn sample_lanes<F: Lanes>(
         &self,

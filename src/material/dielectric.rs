@@ -2,7 +2,7 @@
 //! (`ext_ior`). It reflects the Fresnel share and refracts the rest, whose radiance changes by 1/η².
 //! `specular_reflectance` and `specular_transmittance` (1) multiply.
 
-use super::{BlockBsdf, Bsdf, BsdfSamples, BsdfValues, Lobes, fresnel, ior, single_face};
+use super::{BlockBsdf, Bsdf, BsdfSamples, Lobes, fresnel, ior, single_face};
 use crate::color::{ColorModel, Role};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, Row, texture};
@@ -70,17 +70,6 @@ impl<C: ColorModel> Bsdf<C> for Dielectric<C> {
 }
 
 impl<C: ColorModel> BlockBsdf<C> for Dielectric<C> {
-    #[inline(always)]
-    fn eval_lanes<F: Lanes>(
-        &self,
-        _at: &Points<'_, F>,
-        _wi: Vec3<F>,
-        _wo: Vec3<F>,
-        _w: &[C::Wavelengths],
-    ) -> BsdfValues<F, C::Columns<F>> {
-        BsdfValues::none()
-    }
-
     #[inline(always)]
     fn sample_lanes<F: Lanes>(
         &self,

@@ -85,20 +85,6 @@ impl<S: Spectral> PhongTerms<S> {
     }
 }
 
-impl<S> BsdfSample<S> {
-    /// Straight on through the surface, chosen with that probability.
-    fn passing(wi: Vec3, probability: f32, weight: S) -> Self {
-        Self {
-            wo: -wi,
-            weight,
-            pdf: probability,
-            eta: 1.0,
-            delta: true,
-            null: true,
-        }
-    }
-}
-
 impl<S: Spectral> BsdfValue<S> {
     /// The sample that drew `wo` with this density; `None` where that is 0.
     fn as_sample(self, wo: Vec3, eta: f32) -> Option<BsdfSample<S>> {

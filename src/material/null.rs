@@ -1,13 +1,12 @@
 //! `null`: a surface that light passes as if it were not there.
 
-use glam::{Vec2, Vec3};
-
-use super::{Bsdf, BsdfSample, Lobes};
-use crate::color::{ColorModel, Spectral};
+use super::{BlockBsdf, Bsdf, BsdfSamples, Lobes, single_face};
+use crate::color::{ColorModel, Spectra};
 use crate::description::Properties;
 use crate::description::declared::Plugin;
 use crate::error::Result;
-use crate::interaction::Interaction;
+use crate::interaction::Points;
+use crate::lanes::{Lanes, Vec2, Vec3};
 use crate::texture::Palettes;
 
 /// Nothing.
@@ -36,14 +35,19 @@ impl<C: ColorModel> Bsdf<C> for Null {
         }
     }
 
-    fn sample(
+    single_face!();
+}
+
+impl<C: ColorModel> BlockBsdf<C> for Null {
+    #[inline(always)]
+    fn sample_lanes<F: Lanes>(
         &self,
-        _at: &Interaction<'_>,
-        wi: Vec3,
-        _u1: f32,
-        _u2: Vec2,
-        _w: &C::Wavelengths,
-    ) -> Option<BsdfSample<C::Sample>> {
-        Some(BsdfSample::passing(wi, 1.0, C::Sample::splat(1.0)))
+        _at: &Points<'_, F>,
+        wi: Vec3<F>,
+        _u1: F,
+        _u2: Vec2<F>,
+        _w: &[C::Wavelengths],
+    ) -> BsdfSamples<F, C::Columns<F>> {
+        BsdfSamples::passing(wi, F::one(), C::Columns::<F>::splat(F::one()))
     }
 }

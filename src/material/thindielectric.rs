@@ -3,14 +3,13 @@
 //! on. `int_ior` is bk7 glass and `ext_ior` air by default; `specular_reflectance` and
 //! `specular_transmittance` (1) multiply.
 
-use glam::{Vec2, Vec3};
-
-use super::{Bsdf, BsdfSample, Lobes, dielectric, fresnel, ior};
+use super::{BlockBsdf, Bsdf, BsdfSamples, Lobes, dielectric, fresnel, ior, single_face};
 use crate::color::ColorModel;
 use crate::description::Properties;
 use crate::description::declared::Plugin;
 use crate::error::Result;
-use crate::interaction::Interaction;
+use crate::interaction::Points;
+use crate::lanes::{Lanes, Mask as _, Vec2, Vec3};
 use crate::texture::{Palettes, Texture};
 
 /// A thin clear pane.
@@ -47,27 +46,29 @@ impl<C: ColorModel> Bsdf<C> for ThinDielectric<C> {
         }
     }
 
-    fn sample(
+    single_face!();
+}
+
+impl<C: ColorModel> BlockBsdf<C> for ThinDielectric<C> {
+    #[inline(always)]
+    fn sample_lanes<F: Lanes>(
         &self,
-        at: &Interaction<'_>,
-        wi: Vec3,
-        u1: f32,
-        _u2: Vec2,
-        w: &C::Wavelengths,
-    ) -> Option<BsdfSample<C::Sample>> {
+        at: &Points<'_, F>,
+        wi: Vec3<F>,
+        u1: F,
+        _u2: Vec2<F>,
+        w: &[C::Wavelengths],
+    ) -> BsdfSamples<F, C::Columns<F>> {
         let once = fresnel::dielectric(wi.z.abs(), self.eta).reflectance;
-        let reflectance = once * 2.0 / (1.0 + once);
-        if u1 < reflectance {
-            return Some(BsdfSample {
-                wo: fresnel::mirror::<f32>(wi.into()).into(),
-                weight: self.specular_reflectance.eval(at, w),
-                pdf: reflectance,
-                eta: 1.0,
-                delta: true,
-                null: false,
-            });
-        }
-        let weight = self.specular_transmittance.eval(at, w);
-        Some(BsdfSample::passing(wi, 1.0 - reflectance, weight))
+        let reflectance = (once + once) / (F::one() + once);
+        let reflected = BsdfSamples::delta(
+            F::Mask::splat(true),
+            fresnel::mirror(wi),
+            self.specular_reflectance.eval_lanes(at, w),
+            reflectance,
+        );
+        let transmittance = self.specular_transmittance.eval_lanes(at, w);
+        let passing = BsdfSamples::passing(wi, F::one() - reflectance, transmittance);
+        BsdfSamples::select(u1.lt(reflectance), reflected, passing)
     }
 }
