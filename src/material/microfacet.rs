@@ -12,7 +12,7 @@ use crate::color::Mono;
 use crate::description::Properties;
 use crate::description::declared::{Row, boolean, choice, number};
 use crate::error::Result;
-use crate::interaction::{Interaction, Points};
+use crate::interaction::Points;
 use crate::lanes::{Lanes, Vec2, Vec3, erf, erf_inverse, exp, ln, sin_cos_turns, warp};
 use crate::texture::{Palette, Texture};
 
@@ -103,13 +103,7 @@ impl Roughness {
         })
     }
 
-    pub(super) fn at(&self, at: &Interaction<'_>) -> Distribution<f32> {
-        let u = self.alpha_u.eval(at, &())[0];
-        let v = self.alpha_v.as_ref().map_or(u, |v| v.eval(at, &())[0]);
-        Distribution::new(self.kind, u, v)
-    }
-
-    /// The same at points in lanes.
+    /// The distribution at points.
     #[inline(always)]
     pub(super) fn at_lanes<F: Lanes>(&self, at: &Points<'_, F>) -> Distribution<F> {
         let u = self.alpha_u.numbers(at);
@@ -300,43 +294,48 @@ fn ggx_slope<F: Lanes>(cos: F, u: Vec2<F>) -> Vec2<F> {
 
 /// Two directions and the facet that would take light from one to the other.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Interface {
+pub(super) struct Interface<F: Lanes> {
+    /// Where a facet that is seen from both does it; the other lanes hold anything.
+    pub(super) found: F::Mask,
     /// Its normal, on the front side.
-    pub(super) m: glam::Vec3,
-    /// Whether both directions are on the same side.
-    pub(super) reflection: bool,
+    pub(super) m: Vec3<F>,
+    /// Where both directions are on the same side.
+    pub(super) reflection: F::Mask,
     /// Index of refraction on the side of `wo` over that on the side of `wi`.
-    pub(super) eta: f32,
+    pub(super) eta: F,
     /// Solid angle of normals for each of `wo`.
-    pub(super) jacobian: f32,
+    pub(super) jacobian: F,
 }
 
-impl Interface {
-    /// Of a boundary whose index is `eta` inside over outside; `None` where no facet seen from both does
-    /// it.
-    pub(super) fn between(wi: glam::Vec3, wo: glam::Vec3, eta: f32) -> Option<Self> {
-        let reflection = wi.z * wo.z > 0.0;
-        let eta = match (reflection, wi.z > 0.0) {
-            (true, _) => 1.0,
-            (false, true) => eta,
-            (false, false) => 1.0 / eta,
-        };
+impl<F: Lanes> Interface<F> {
+    /// Of a boundary whose index is `eta` inside over outside.
+    #[inline(always)]
+    pub(super) fn between(wi: Vec3<F>, wo: Vec3<F>, eta: f32) -> Self {
+        let (zero, one) = (F::zero(), F::one());
+        let reflection = zero.lt(wi.z * wo.z);
+        let relative = F::select(zero.lt(wi.z), F::splat(eta), F::splat(1.0 / eta));
+        let eta = F::select(reflection, one, relative);
         let half = (wi + wo * eta).normalize_or_zero();
-        let m = if half.z < 0.0 { -half } else { half };
+        let m = Vec3::select(half.z.lt(zero), -half, half);
         let (cos_i, cos_o) = (wi.dot(m), wo.dot(m));
-        let seen = cos_i * wi.z > 0.0 && cos_o * wo.z > 0.0;
-        let jacobian = if reflection {
-            0.25 / cos_o.abs()
-        } else {
-            eta * eta * cos_o.abs() / (cos_i + eta * cos_o).powi(2)
-        };
-        (seen && jacobian.is_finite()).then_some(Self {
+        let seen = zero.lt(cos_i * wi.z) & zero.lt(cos_o * wo.z);
+        let reflected = F::splat(0.25) / cos_o.abs();
+        let refracted = eta * eta * cos_o.abs() / (cos_i + eta * cos_o).squared();
+        let jacobian = F::select(reflection, reflected, refracted);
+        Self {
+            found: seen & jacobian.is_finite(),
             m,
             reflection,
             eta,
             jacobian,
-        })
+        }
     }
+}
+
+/// `v` turned over where it is behind the surface.
+#[inline(always)]
+pub(super) fn in_front<F: Lanes>(v: Vec3<F>) -> Vec3<F> {
+    v * F::one().copysign(v.z)
 }
 
 #[cfg(test)]

@@ -176,11 +176,14 @@ impl<C: ColorModel> Bsdf<C> for Principled<C> {
         w: &C::Wavelengths,
     ) -> Option<BsdfValue<C::Sample>> {
         let front = wi.z > 0.0;
-        let interface = Interface::between(wi, wo, self.eta)?;
+        let interface = Interface::<f32>::between(wi.into(), wo.into(), self.eta);
+        if !interface.found {
+            return None;
+        }
         let point = self.parameters.at(at, w);
         let mix = self.mix(at, &point);
         let shares = self.shares(front, &mix)?;
-        let m = interface.m;
+        let m = Vec3::from(interface.m);
         let (cos_i, cos_o) = (wi.z.abs(), wo.z.abs());
         let (cos_m, cos_d) = (wi.dot(m), wo.dot(m));
         let fresnel = fresnel::dielectric(cos_m, self.eta).reflectance;

@@ -2,15 +2,16 @@
 //! refraction through rough surfaces*, 2007). Parameters of the media as for a dielectric, of the
 //! roughness as for a roughconductor.
 
-use glam::{Vec2, Vec3};
-
-use super::microfacet::{Distribution, Interface, Roughness};
-use super::{Bsdf, BsdfSample, BsdfValue, Lobes, dielectric, fresnel, ior};
-use crate::color::ColorModel;
+use super::microfacet::{self, Distribution, Interface, Roughness};
+use super::{
+    BlockBsdf, Bsdf, BsdfSamples, BsdfValues, Lobes, dielectric, fresnel, ior, single_face,
+};
+use crate::color::{ColorModel, Spectra};
 use crate::description::Properties;
 use crate::description::declared::Plugin;
 use crate::error::Result;
-use crate::interaction::Interaction;
+use crate::interaction::Points;
+use crate::lanes::{Lanes, Vec2, Vec3};
 use crate::texture::{Palettes, Texture};
 
 /// A rough clear boundary.
@@ -47,11 +48,12 @@ impl<C: ColorModel> RoughDielectric<C> {
 
 /// The distribution to draw from: broader where facets are drawn by area, which keeps weights small
 /// (Walter et al., §5.3).
-fn drawn_from(distribution: Distribution<f32>, wi: Vec3) -> Distribution<f32> {
+#[inline(always)]
+fn drawn_from<F: Lanes>(distribution: Distribution<F>, wi: Vec3<F>) -> Distribution<F> {
     if distribution.samples_visible() {
         distribution
     } else {
-        distribution.scaled(1.2 - 0.2 * wi.z.abs().sqrt())
+        distribution.scaled(F::splat(1.2) - F::splat(0.2) * wi.z.abs().sqrt())
     }
 }
 
@@ -63,65 +65,67 @@ impl<C: ColorModel> Bsdf<C> for RoughDielectric<C> {
         }
     }
 
-    fn eval(
+    single_face!();
+}
+
+impl<C: ColorModel> BlockBsdf<C> for RoughDielectric<C> {
+    #[inline(always)]
+    fn eval_lanes<F: Lanes>(
         &self,
-        at: &Interaction<'_>,
-        wi: Vec3,
-        wo: Vec3,
-        w: &C::Wavelengths,
-    ) -> Option<BsdfValue<C::Sample>> {
-        let interface = Interface::between(wi, wo, self.eta)?;
-        let distribution = self.roughness.at(at);
-        let m = interface.m;
-        let reflectance = fresnel::dielectric(wi.dot(m), self.eta).reflectance;
-        let dg = distribution.eval(m.into()) * distribution.g(wi.into(), wo.into(), m.into());
-        if dg == 0.0 {
-            return None;
-        }
-        let (share, factor, radiance) = if interface.reflection {
-            (reflectance, &self.specular_reflectance, 1.0)
-        } else {
-            let compression = interface.eta * interface.eta;
-            (
-                1.0 - reflectance,
-                &self.specular_transmittance,
-                1.0 / compression,
-            )
-        };
-        let scale = share * dg * radiance * interface.jacobian * (wi.dot(m) / wi.z).abs();
-        let facets = drawn_from(distribution, wi).pdf((wi * wi.z.signum()).into(), m.into());
-        Some(BsdfValue {
-            value: factor.eval(at, w) * scale,
+        at: &Points<'_, F>,
+        wi: Vec3<F>,
+        wo: Vec3<F>,
+        w: &[C::Wavelengths],
+    ) -> BsdfValues<F, C::Columns<F>> {
+        let one = F::one();
+        let interface = Interface::between(wi, wo, self.eta);
+        let (m, reflection) = (interface.m, interface.reflection);
+        let distribution = self.roughness.at_lanes(at);
+        let cos = wi.dot(m);
+        let reflectance = fresnel::dielectric(cos, self.eta).reflectance;
+        let dg = distribution.eval(m) * distribution.g(wi, wo, m);
+        let share = F::select(reflection, reflectance, one - reflectance);
+        let factor = C::Columns::<F>::select(
+            reflection,
+            self.specular_reflectance.eval_lanes(at, w),
+            self.specular_transmittance.eval_lanes(at, w),
+        );
+        // That of refracted light; 1 for what is reflected.
+        let radiance = one / (interface.eta * interface.eta);
+        let scale = share * dg * radiance * interface.jacobian * (cos / wi.z).abs();
+        let facets = drawn_from(distribution, wi).pdf(microfacet::in_front(wi), m);
+        let values = BsdfValues {
+            value: factor * scale,
             pdf: facets * share * interface.jacobian,
-        })
+        };
+        values.only(interface.found & F::zero().lt(dg))
     }
 
-    fn sample(
+    #[inline(always)]
+    fn sample_lanes<F: Lanes>(
         &self,
-        at: &Interaction<'_>,
-        wi: Vec3,
-        u1: f32,
-        u2: Vec2,
-        w: &C::Wavelengths,
-    ) -> Option<BsdfSample<C::Sample>> {
-        if wi.z == 0.0 {
-            return None;
-        }
-        let distribution = drawn_from(self.roughness.at(at), wi);
-        let m = Vec3::from(distribution.sample((wi * wi.z.signum()).into(), u2.into()));
+        at: &Points<'_, F>,
+        wi: Vec3<F>,
+        u1: F,
+        u2: Vec2<F>,
+        w: &[C::Wavelengths],
+    ) -> BsdfSamples<F, C::Columns<F>> {
+        let distribution = drawn_from(self.roughness.at_lanes(at), wi);
+        let m = distribution.sample(microfacet::in_front(wi), u2);
         let boundary = fresnel::dielectric(wi.dot(m), self.eta);
-        let reflected = u1 < boundary.reflectance;
-        let (wo, eta) = if reflected {
-            (Vec3::from(fresnel::reflect((wi).into(), m.into())), 1.0)
-        } else {
-            (
-                Vec3::from(fresnel::refract(wi.into(), m.into(), &boundary)),
-                boundary.eta,
-            )
-        };
-        if (wo.z * wi.z > 0.0) != reflected {
-            return None; // the facet sends the light to the wrong side of the surface
+        let reflected = u1.lt(boundary.reflectance);
+        let wo = Vec3::select(
+            reflected,
+            fresnel::reflect(wi, m),
+            fresnel::refract(wi, m, &boundary),
+        );
+        let eta = F::select(reflected, F::one(), boundary.eta);
+        let samples = self.eval_lanes(at, wi, wo, w).as_samples(wo, eta);
+        // Other facets send the light to the wrong side of the surface.
+        let fits = !(reflected ^ F::zero().lt(wo.z * wi.z));
+        BsdfSamples {
+            drawn: samples.drawn & fits,
+            ..samples
         }
-        self.eval(at, wi, wo, w)?.as_sample(wo, eta)
     }
 }
