@@ -2,14 +2,16 @@
 //! [0, 1]). Mitsuba 3.9.1 mixes densities with probabilities where one of the two is a mirror and loses
 //! energy; here a direction that only one of them can draw carries the weight of that one alone.
 
-use glam::{Vec2, Vec3};
-
-use super::{Bsdf, BsdfSample, BsdfValue, Lobes, Material, PhongTerms, fraction, nested};
+use super::{
+    BlockBsdf, Bsdf, BsdfSamples, BsdfValues, Lobes, Material, PhongTerms, fraction, nested,
+    single_face,
+};
 use crate::color::{ColorModel, Mono};
 use crate::description::declared::{Plugin, nested as nested_row, number};
 use crate::description::{Kind, Properties};
 use crate::error::Result;
-use crate::interaction::Interaction;
+use crate::interaction::{Interaction, Points};
+use crate::lanes::{Lanes, Mask as _, Vec2, Vec3};
 use crate::texture::{Palettes, Texture};
 
 /// Two materials, mixed.
@@ -47,61 +49,13 @@ impl<C: ColorModel> Bsdf<C> for BlendBsdf<C> {
         }
     }
 
-    fn eval(
-        &self,
-        at: &Interaction<'_>,
-        wi: Vec3,
-        wo: Vec3,
-        w: &C::Wavelengths,
-    ) -> Option<BsdfValue<C::Sample>> {
-        let weight = fraction(&self.weight, at);
-        let part = |i: usize, weight: f32| {
-            let value = self.nested[i].eval(at, wi, wo, w)?;
-            Some(BsdfValue {
-                value: value.value * weight,
-                pdf: value.pdf * weight,
-            })
-        };
-        match (part(0, 1.0 - weight), part(1, weight)) {
-            (Some(a), Some(b)) => Some(BsdfValue {
-                value: a.value + b.value,
-                pdf: a.pdf + b.pdf,
-            }),
-            (a, b) => a.or(b),
-        }
-    }
-
-    fn sample(
-        &self,
-        at: &Interaction<'_>,
-        wi: Vec3,
-        u1: f32,
-        u2: Vec2,
-        w: &C::Wavelengths,
-    ) -> Option<BsdfSample<C::Sample>> {
-        let weight = fraction(&self.weight, at);
-        let (chosen, share, u1) = if u1 < weight {
-            (1, weight, u1 / weight)
-        } else {
-            let rest = 1.0 - weight;
-            (0, rest, ((u1 - weight) / rest).min(1f32.next_down()))
-        };
-        let sample = self.nested[chosen].sample(at, wi, u1, u2, w)?;
-        if sample.delta {
-            return Some(BsdfSample {
-                pdf: sample.pdf * share,
-                ..sample
-            });
-        }
-        self.eval(at, wi, sample.wo, w)?
-            .as_sample(sample.wo, sample.eta)
-    }
+    single_face!();
 
     fn phong(
         &self,
         at: &Interaction<'_>,
-        wi: Vec3,
-        wo: Vec3,
+        wi: glam::Vec3,
+        wo: glam::Vec3,
         w: &C::Wavelengths,
     ) -> Option<PhongTerms<C::Sample>> {
         let weight = fraction(&self.weight, at);
@@ -118,9 +72,83 @@ impl<C: ColorModel> Bsdf<C> for BlendBsdf<C> {
         }
     }
 
-    fn ambient(&self, at: &Interaction<'_>, wi: Vec3, w: &C::Wavelengths) -> C::Sample {
+    fn ambient(&self, at: &Interaction<'_>, wi: glam::Vec3, w: &C::Wavelengths) -> C::Sample {
         let weight = fraction(&self.weight, at);
         let [first, second] = [0, 1].map(|i: usize| self.nested[i].ambient(at, wi, w));
         first * (1.0 - weight) + second * weight
+    }
+}
+
+impl<C: ColorModel> BlockBsdf<C> for BlendBsdf<C> {
+    #[inline(always)]
+    fn eval_lanes<F: Lanes>(
+        &self,
+        at: &Points<'_, F>,
+        wi: Vec3<F>,
+        wo: Vec3<F>,
+        w: &[C::Wavelengths],
+    ) -> BsdfValues<F, C::Columns<F>> {
+        let weight = self.weight.numbers(at).clamp(0.0, 1.0);
+        let rest = F::one() - weight;
+        let first = self.nested[0].eval_lanes(at, wi, wo, w);
+        let second = self.nested[1].eval_lanes(at, wi, wo, w);
+        BsdfValues {
+            value: first.value * rest + second.value * weight,
+            pdf: first.pdf * rest + second.pdf * weight,
+        }
+    }
+
+    #[inline(always)]
+    fn sample_lanes<F: Lanes>(
+        &self,
+        at: &Points<'_, F>,
+        wi: Vec3<F>,
+        u1: F,
+        u2: Vec2<F>,
+        w: &[C::Wavelengths],
+    ) -> BsdfSamples<F, C::Columns<F>> {
+        let weight = self.weight.numbers(at).clamp(0.0, 1.0);
+        let rest = F::one() - weight;
+        let second = u1.lt(weight);
+        let of_first = ((u1 - weight) / rest).min(F::splat(1f32.next_down()));
+        let u1 = F::select(second, u1 / weight, of_first);
+        let sample = self.sample_either(second, at, wi, (u1, u2), w);
+        let delta = BsdfSamples {
+            pdf: sample.pdf * F::select(second, weight, rest),
+            ..sample
+        };
+        if !(sample.drawn & !sample.delta & at.active).any() {
+            return delta;
+        }
+        let both = self.eval_lanes(at, wi, sample.wo, w);
+        let both = both.as_samples(sample.wo, sample.eta);
+        let either = BsdfSamples::select(sample.delta, delta, both);
+        BsdfSamples {
+            drawn: either.drawn & sample.drawn,
+            ..either
+        }
+    }
+}
+
+impl<C: ColorModel> BlendBsdf<C> {
+    /// Draws from the second material where the mask is set, else from the first.
+    #[inline(always)]
+    fn sample_either<F: Lanes>(
+        &self,
+        second: F::Mask,
+        at: &Points<'_, F>,
+        wi: Vec3<F>,
+        (u1, u2): (F, Vec2<F>),
+        w: &[C::Wavelengths],
+    ) -> BsdfSamples<F, C::Columns<F>> {
+        let [a, b] = &self.nested;
+        if !(second & at.active).any() {
+            return a.sample_lanes(at, wi, u1, u2, w);
+        }
+        let of_second = b.sample_lanes(at, wi, u1, u2, w);
+        if !(!second & at.active).any() {
+            return of_second;
+        }
+        BsdfSamples::select(second, of_second, a.sample_lanes(at, wi, u1, u2, w))
     }
 }

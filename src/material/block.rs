@@ -229,6 +229,7 @@ impl<C: ColorModel, F: Lanes> Call<F> for Eval<'_, C, F> {
             w,
         } = self;
         match material {
+            Material::BlendBsdf(m) => m.eval_lanes(at, wi, wo, w),
             Material::Conductor(m) => m.eval_lanes(at, wi, wo, w),
             Material::Dielectric(m) => m.eval_lanes(at, wi, wo, w),
             Material::Diffuse(m) => m.eval_lanes(at, wi, wo, w),
@@ -269,6 +270,7 @@ impl<C: ColorModel, F: Lanes> Call<F> for Draw<'_, C, F> {
             w,
         } = self;
         match material {
+            Material::BlendBsdf(m) => m.sample_lanes(at, wi, u1, u2, w),
             Material::Conductor(m) => m.sample_lanes(at, wi, u1, u2, w),
             Material::Dielectric(m) => m.sample_lanes(at, wi, u1, u2, w),
             Material::Diffuse(m) => m.sample_lanes(at, wi, u1, u2, w),
