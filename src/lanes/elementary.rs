@@ -73,6 +73,12 @@ pub fn ln<F: Lanes>(x: F) -> F {
     m + tail + exponent * F::splat(LN_2[0])
 }
 
+/// x to the power of `y`; what is below the least normal number, also 0, counts as that.
+#[inline(always)]
+pub fn pow<F: Lanes>(x: F, y: F) -> F {
+    exp(y * ln(x.max(F::splat(f32::MIN_POSITIVE))))
+}
+
 /// Sine and cosine for |x| ≤ π/4.
 #[inline(always)]
 pub(super) fn sin_cos_small<F: Lanes>(x: F) -> (F, F) {

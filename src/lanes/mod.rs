@@ -24,7 +24,7 @@ mod x86;
 use std::fmt::Debug;
 use std::ops::{Add, BitAnd, BitOr, BitXor, Div, Index, IndexMut, Mul, Neg, Not, Sub};
 
-pub use elementary::{acos, atan2, erf, erf_inverse, exp, ln, sin_cos, sin_cos_turns};
+pub use elementary::{acos, atan2, erf, erf_inverse, exp, ln, pow, sin_cos, sin_cos_turns};
 pub use frame::Frame;
 pub use kernel::{Kernel, Set};
 pub use vector::{Vec2, Vec3};

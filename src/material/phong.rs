@@ -9,16 +9,16 @@
 
 use std::f32::consts::{FRAC_1_PI, TAU};
 
-use glam::{Vec2, Vec3};
-
-use super::{Bsdf, BsdfSample, BsdfValue, Lobes, PhongTerms, fresnel, mean, samples};
+use super::{
+    BlockBsdf, Bsdf, BsdfSamples, BsdfValues, Lobes, PhongTerms, fresnel, mean, samples,
+    single_face,
+};
 use crate::color::{ColorModel, Mono, Role, Spectral};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, number, texture};
 use crate::error::Result;
-use crate::interaction::Interaction;
-use crate::lanes::warp;
-use crate::math::Frame;
+use crate::interaction::{Interaction, Points};
+use crate::lanes::{Frame, Lanes, Vec2, Vec3, pow, sin_cos_turns, warp};
 use crate::texture::{Palettes, Texture};
 
 /// A matte base and a cosine-power highlight.
@@ -75,19 +75,18 @@ impl<C: ColorModel> Phong<C> {
         })
     }
 
-    fn exponent(&self, at: &Interaction<'_>) -> f32 {
-        self.exponent.eval(at, &())[0].max(0.0)
+    #[inline(always)]
+    fn exponent<F: Lanes>(&self, at: &Points<'_, F>) -> F {
+        self.exponent.numbers(at).max(F::zero())
     }
 }
 
 /// max(0, R·V)ⁿ, the same whichever of the two directions is the light's.
-fn lobe(wi: Vec3, wo: Vec3, exponent: f32) -> f32 {
-    let cosine = Vec3::from(fresnel::mirror::<f32>(wi.into())).dot(wo);
-    if cosine > 0.0 {
-        cosine.min(1.0).powf(exponent)
-    } else {
-        0.0
-    }
+#[inline(always)]
+fn lobe<F: Lanes>(wi: Vec3<F>, wo: Vec3<F>, exponent: F) -> F {
+    let (zero, one) = (F::zero(), F::one());
+    let cosine = fresnel::mirror(wi).dot(wo);
+    F::select(zero.lt(cosine), pow(cosine.min(one), exponent), zero)
 }
 
 impl<C: ColorModel> Bsdf<C> for Phong<C> {
@@ -95,46 +94,7 @@ impl<C: ColorModel> Bsdf<C> for Phong<C> {
         Lobes::REFLECTION
     }
 
-    fn eval(
-        &self,
-        at: &Interaction<'_>,
-        wi: Vec3,
-        wo: Vec3,
-        w: &C::Wavelengths,
-    ) -> Option<BsdfValue<C::Sample>> {
-        if wi.z <= 0.0 || wo.z <= 0.0 {
-            return None;
-        }
-        let exponent = self.exponent(at);
-        let lobe = lobe(wi, wo, exponent) / TAU;
-        let diffuse = self.diffuse_reflectance.eval(at, w) * FRAC_1_PI;
-        let specular = self.specular_reflectance.eval(at, w) * ((exponent + 2.0) * lobe);
-        let base = (1.0 - self.specular_weight) * warp::cosine_hemisphere_pdf(wo.z);
-        Some(BsdfValue {
-            value: (diffuse + specular) * (self.scale * wo.z),
-            pdf: base + self.specular_weight * (exponent + 1.0) * lobe,
-        })
-    }
-
-    fn sample(
-        &self,
-        at: &Interaction<'_>,
-        wi: Vec3,
-        u1: f32,
-        u2: Vec2,
-        w: &C::Wavelengths,
-    ) -> Option<BsdfSample<C::Sample>> {
-        let wo = if u1 < self.specular_weight {
-            let cosine = (1.0 - u2.x).powf(1.0 / (self.exponent(at) + 1.0));
-            let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
-            let (y, x) = (TAU * u2.y).sin_cos();
-            let around = Frame::around(fresnel::mirror::<f32>(wi.into()).into());
-            around.to_world(Vec3::new(x * sine, y * sine, cosine))
-        } else {
-            Vec3::from(warp::cosine_hemisphere(u2.into()))
-        };
-        self.eval(at, wi, wo, w)?.as_sample(wo, 1.0)
-    }
+    single_face!();
 
     fn albedo(&self, at: &Interaction<'_>, w: &C::Wavelengths) -> C::Sample {
         self.diffuse_reflectance.eval(at, w) * self.scale
@@ -143,21 +103,67 @@ impl<C: ColorModel> Bsdf<C> for Phong<C> {
     fn phong(
         &self,
         at: &Interaction<'_>,
-        wi: Vec3,
-        wo: Vec3,
+        wi: glam::Vec3,
+        wo: glam::Vec3,
         w: &C::Wavelengths,
     ) -> Option<PhongTerms<C::Sample>> {
+        let exponent = self.exponent(&Points::one(at));
         (wi.z > 0.0 && wo.z > 0.0).then(|| PhongTerms {
             diffuse: self.diffuse_reflectance.eval(at, w) * wo.z,
-            specular: self.specular_reflectance.eval(at, w) * lobe(wi, wo, self.exponent(at)),
+            specular: self.specular_reflectance.eval(at, w)
+                * lobe::<f32>(wi.into(), wo.into(), exponent),
         })
     }
 
-    fn ambient(&self, at: &Interaction<'_>, wi: Vec3, w: &C::Wavelengths) -> C::Sample {
+    fn ambient(&self, at: &Interaction<'_>, wi: glam::Vec3, w: &C::Wavelengths) -> C::Sample {
         if wi.z > 0.0 {
             self.ambient_reflectance.eval(at, w)
         } else {
             C::Sample::zero()
         }
+    }
+}
+
+impl<C: ColorModel> BlockBsdf<C> for Phong<C> {
+    #[inline(always)]
+    fn eval_lanes<F: Lanes>(
+        &self,
+        at: &Points<'_, F>,
+        wi: Vec3<F>,
+        wo: Vec3<F>,
+        w: &[C::Wavelengths],
+    ) -> BsdfValues<F, C::Columns<F>> {
+        let (zero, one) = (F::zero(), F::one());
+        let exponent = self.exponent(at);
+        let lobe = lobe(wi, wo, exponent) / F::splat(TAU);
+        let diffuse = self.diffuse_reflectance.eval_lanes(at, w) * F::splat(FRAC_1_PI);
+        let highlight = (exponent + F::splat(2.0)) * lobe;
+        let specular = self.specular_reflectance.eval_lanes(at, w) * highlight;
+        let base = F::splat(1.0 - self.specular_weight) * warp::cosine_hemisphere_pdf(wo.z);
+        let values = BsdfValues {
+            value: (diffuse + specular) * (F::splat(self.scale) * wo.z),
+            pdf: base + F::splat(self.specular_weight) * (exponent + one) * lobe,
+        };
+        values.only(zero.lt(wi.z) & zero.lt(wo.z))
+    }
+
+    #[inline(always)]
+    fn sample_lanes<F: Lanes>(
+        &self,
+        at: &Points<'_, F>,
+        wi: Vec3<F>,
+        u1: F,
+        u2: Vec2<F>,
+        w: &[C::Wavelengths],
+    ) -> BsdfSamples<F, C::Columns<F>> {
+        let one = F::one();
+        let cosine = pow(one - u2.x, one / (self.exponent(at) + one));
+        let sine = (one - cosine * cosine).max(F::zero()).sqrt();
+        let (y, x) = sin_cos_turns(u2.y);
+        let around = Frame::around(fresnel::mirror(wi));
+        let highlight = around.to_world(Vec3::new(x * sine, y * sine, cosine));
+        let base = warp::cosine_hemisphere(u2);
+        let wo = Vec3::select(u1.lt(F::splat(self.specular_weight)), highlight, base);
+        self.eval_lanes(at, wi, wo, w).as_samples(wo, one)
     }
 }
