@@ -92,6 +92,19 @@ pub trait ColorModel: Clone + std::fmt::Debug + Send + Sync + 'static {
 
     /// The luminance of a reflectance: 1 for white.
     fn luminance(&self, sample: &Self::Sample, wavelengths: &Self::Wavelengths) -> f32;
+    /// The same for paths in lanes, whose wavelengths are given from the first lane on.
+    #[inline(always)]
+    fn luminance_lanes<F: Lanes>(
+        &self,
+        samples: Self::Columns<F>,
+        wavelengths: &[Self::Wavelengths],
+    ) -> F {
+        let rows = samples.rows();
+        F::from_fn(|lane| {
+            let sample = Self::Columns::<F>::of(&rows, lane);
+            self.luminance(&sample, &wavelengths[lane])
+        })
+    }
 
     /// The channels of an image: `R`, `G`, `B`, and one a band.
     fn channels(&self) -> Vec<String>;
@@ -100,8 +113,9 @@ pub trait ColorModel: Clone + std::fmt::Debug + Send + Sync + 'static {
 }
 
 /// The luminance of linear BT.709.
-pub fn luminance(rgb: [f32; 3]) -> f32 {
-    0.212_671 * rgb[0] + 0.715_16 * rgb[1] + 0.072_169 * rgb[2]
+#[inline(always)]
+pub fn luminance<F: Lanes>([r, g, b]: [F; 3]) -> F {
+    F::splat(0.212_671) * r + F::splat(0.715_16) * g + F::splat(0.072_169) * b
 }
 
 /// CIE XYZ of linear BT.709.

@@ -90,6 +90,11 @@ impl ColorModel for Rgb {
         luminance(sample.0)
     }
 
+    #[inline(always)]
+    fn luminance_lanes<F: Lanes>(&self, samples: Columns<F, 3>, _wavelengths: &[()]) -> F {
+        luminance(samples.0)
+    }
+
     fn channels(&self) -> Vec<String> {
         ["R", "G", "B"].map(String::from).to_vec()
     }

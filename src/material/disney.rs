@@ -2,16 +2,15 @@
 //! *Physically based shading at Disney*, 2012, and *Extending the Disney BRDF to a BSDF with integrated
 //! subsurface scattering*, 2015), in the form of Mitsuba 3.
 
-use std::f32::consts::{FRAC_1_PI, PI, TAU};
-
-use glam::{Vec2, Vec3};
+use std::f32::consts::{FRAC_1_PI, PI};
 
 use super::microfacet::{Distribution, Kind, Shape};
-use crate::color::{ColorModel, Mono, Role, Spectral};
+use crate::color::{ColorModel, Mono, Role, Spectra};
 use crate::description::declared::{Row, float, number as number_row, texture};
 use crate::description::{Properties, Property, Value};
 use crate::error::Result;
-use crate::interaction::Interaction;
+use crate::interaction::Points;
+use crate::lanes::{Lanes, Vec2, Vec3, ln, pow, sin_cos_turns};
 use crate::texture::{Palettes, Texture};
 
 /// The parameters that both materials have.
@@ -72,30 +71,31 @@ impl<C: ColorModel> Parameters<C> {
         })
     }
 
-    pub(super) fn at(&self, at: &Interaction<'_>, w: &C::Wavelengths) -> Point<C::Sample> {
-        let base_color = self.base_color.eval(at, w);
-        let luminance = self.color.luminance(&base_color, w);
+    /// The parameters at points.
+    #[inline(always)]
+    pub(super) fn at<F: Lanes>(
+        &self,
+        at: &Points<'_, F>,
+        w: &[C::Wavelengths],
+    ) -> Point<F, C::Columns<F>> {
+        let base_color = self.base_color.eval_lanes(at, w);
+        let luminance = self.color.luminance_lanes(base_color, w);
         Point {
             base_color,
-            tint: if luminance > 0.0 {
-                base_color / luminance
-            } else {
-                C::Sample::splat(1.0)
-            },
-            roughness: number(&self.roughness, at),
-            anisotropic: number(&self.anisotropic, at),
-            spec_trans: number(&self.spec_trans, at),
-            spec_tint: number(&self.spec_tint, at),
-            sheen: number(&self.sheen, at),
-            sheen_tint: number(&self.sheen_tint, at),
-            flatness: number(&self.flatness, at),
+            tint: C::Columns::<F>::select(
+                F::zero().lt(luminance),
+                base_color * (F::one() / luminance),
+                C::Columns::<F>::splat(F::one()),
+            ),
+            roughness: self.roughness.numbers(at),
+            anisotropic: self.anisotropic.numbers(at),
+            spec_trans: self.spec_trans.numbers(at),
+            spec_tint: self.spec_tint.numbers(at),
+            sheen: self.sheen.numbers(at),
+            sheen_tint: self.sheen_tint.numbers(at),
+            flatness: self.flatness.numbers(at),
         }
     }
-}
-
-/// A texture's number.
-pub(super) fn number(texture: &Texture<Mono>, at: &Interaction<'_>) -> f32 {
-    texture.eval(at, &())[0]
 }
 
 /// Whether the scene gives the parameter and it is not simply 0.
@@ -114,117 +114,165 @@ pub(super) fn rate(properties: &Properties<'_>, name: &'static str) -> Result<f3
     Ok(properties.float(name)? as f32)
 }
 
-/// The parameters at a point of a surface.
+/// The parameters at points of a surface.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Point<S> {
+pub(super) struct Point<F, S> {
+    /// What the surface's colour is.
     pub(super) base_color: S,
     /// The base colour's hue: scaled to luminance 1.
     pub(super) tint: S,
-    pub(super) roughness: f32,
-    pub(super) anisotropic: f32,
-    pub(super) spec_trans: f32,
-    pub(super) spec_tint: f32,
-    sheen: f32,
-    sheen_tint: f32,
-    flatness: f32,
+    roughness: F,
+    anisotropic: F,
+    /// How much is glass.
+    pub(super) spec_trans: F,
+    /// How far highlights take on the colour.
+    pub(super) spec_tint: F,
+    sheen: F,
+    sheen_tint: F,
+    flatness: F,
 }
 
-impl<S: Spectral> Point<S> {
+impl<F: Lanes, S: Spectra<F>> Point<F, S> {
     /// The facets of the main specular lobes, with the roughness times `factor`.
-    pub(super) fn distribution(&self, factor: f32) -> Distribution<f32> {
+    #[inline(always)]
+    pub(super) fn distribution(&self, factor: F) -> Distribution<F> {
         const KIND: Kind = Kind {
             shape: Shape::Ggx,
             sample_visible: true,
         };
-        let alpha = (self.roughness * factor).powi(2);
-        let aspect = (1.0 - 0.9 * self.anisotropic).sqrt();
-        Distribution::new(KIND, (alpha / aspect).max(1e-3), (alpha * aspect).max(1e-3))
+        let least = F::splat(1e-3);
+        let alpha = (self.roughness * factor).squared();
+        let aspect = (F::one() - F::splat(0.9) * self.anisotropic).sqrt();
+        Distribution::new(
+            KIND,
+            (alpha / aspect).max(least),
+            (alpha * aspect).max(least),
+        )
     }
 
     /// f of the diffuse lobe with its retro-reflection, flattened toward subsurface scattering; cosines
     /// of incidence, of exitance and between exitance and the half vector.
-    pub(super) fn diffuse(&self, cos_i: f32, cos_o: f32, cos_d: f32) -> S {
+    #[inline(always)]
+    pub(super) fn diffuse(&self, cos_i: F, cos_o: F, cos_d: F) -> S {
+        let (half, one) = (F::splat(0.5), F::one());
         let (f_i, f_o) = (schlick_weight(cos_i), schlick_weight(cos_o));
-        let retro = 2.0 * self.roughness * cos_d * cos_d;
-        let rough =
-            (1.0 - 0.5 * f_i) * (1.0 - 0.5 * f_o) + retro * (f_o + f_i + f_o * f_i * (retro - 1.0));
-        let grazing = 0.5 * retro;
-        let flat = lerp(1.0, grazing, f_o) * lerp(1.0, grazing, f_i);
-        let flat = 1.25 * (flat * (1.0 / (cos_o + cos_i) - 0.5) + 0.5);
-        self.base_color * (FRAC_1_PI * lerp(rough, flat, self.flatness))
+        let retro = F::splat(2.0) * self.roughness * cos_d * cos_d;
+        let rough = (one - half * f_i) * (one - half * f_o)
+            + retro * (f_o + f_i + f_o * f_i * (retro - one));
+        let grazing = half * retro;
+        let flat = lerp(one, grazing, f_o) * lerp(one, grazing, f_i);
+        let flat = F::splat(1.25) * (flat * (one / (cos_o + cos_i) - half) + half);
+        self.base_color * (F::splat(FRAC_1_PI) * lerp(rough, flat, self.flatness))
     }
 
     /// f of the sheen of cloth at grazing angles.
-    pub(super) fn sheen(&self, cos_d: f32) -> S {
+    #[inline(always)]
+    pub(super) fn sheen(&self, cos_d: F) -> S {
         let strength = self.sheen * schlick_weight(cos_d.abs());
-        self.tint
-            .map(|tint| strength * lerp(1.0, tint, self.sheen_tint))
+        let mut sheen = self.tint;
+        for c in 0..S::CHANNELS {
+            sheen = sheen.with(c, strength * lerp(F::one(), sheen[c], self.sheen_tint));
+        }
+        sheen
     }
 }
 
-pub(super) fn lerp(a: f32, b: f32, t: f32) -> f32 {
-    a * (1.0 - t) + b * t
+/// `a` at 0, `b` at 1.
+#[inline(always)]
+pub(super) fn lerp<F: Lanes>(a: F, b: F, t: F) -> F {
+    a * (F::one() - t) + b * t
 }
 
 /// (1 − cos θ)⁵.
-fn schlick_weight(cos: f32) -> f32 {
-    (1.0 - cos).clamp(0.0, 1.0).powi(5)
+#[inline(always)]
+fn schlick_weight<F: Lanes>(cos: F) -> F {
+    let x = (F::one() - cos).clamp(0.0, 1.0);
+    let x2 = x * x;
+    x2 * x2 * x
 }
 
-/// Schlick's approximation of Fresnel's reflectance from outside, `r0` at normal incidence.
-pub(super) fn schlick(r0: f32, cos: f32, eta: f32) -> f32 {
-    let weight = if eta > 1.0 {
-        schlick_weight(cos.abs())
-    } else {
-        let cos2_t = 1.0 - (1.0 - cos * cos) / (eta * eta);
-        schlick_weight(cos2_t.max(0.0).sqrt())
-    };
-    lerp(weight, 1.0, r0)
+/// Schlick's approximation of Fresnel's reflectance from outside.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Schlick<F> {
+    weight: F,
+}
+
+impl<F: Lanes> Schlick<F> {
+    /// At the cosine `cos`.
+    #[inline(always)]
+    pub(super) fn new(cos: F, eta: F) -> Self {
+        let one = F::one();
+        let cos2_t = one - (one - cos * cos) / (eta * eta);
+        let inside = cos2_t.max(F::zero()).sqrt();
+        Self {
+            weight: schlick_weight(F::select(one.lt(eta), cos.abs(), inside)),
+        }
+    }
+
+    /// Where `r0` is reflected at normal incidence.
+    #[inline(always)]
+    pub(super) fn reflectance(self, r0: F) -> F {
+        lerp(self.weight, F::one(), r0)
+    }
 }
 
 /// Fresnel's reflectance at normal incidence.
-pub(super) fn normal_reflectance(eta: f32) -> f32 {
-    ((eta - 1.0) / (eta + 1.0)).powi(2)
+#[inline(always)]
+pub(super) fn normal_reflectance<F: Lanes>(eta: F) -> F {
+    ((eta - F::one()) / (eta + F::one())).squared()
 }
 
 /// The clear coat's facets: Burley's GTR with γ = 1, long-tailed, of roughness 0.1 (gloss 0) to 0.001.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Coat {
-    alpha2: f32,
+pub(super) struct Coat<F> {
+    alpha2: F,
 }
 
-impl Coat {
-    pub(super) fn new(gloss: f32) -> Self {
+impl<F: Lanes> Coat<F> {
+    /// Of a gloss in [0, 1].
+    #[inline(always)]
+    pub(super) fn new(gloss: F) -> Self {
         Self {
-            alpha2: lerp(0.1, 0.001, gloss).powi(2),
+            alpha2: lerp(F::splat(0.1), F::splat(0.001), gloss).squared(),
         }
     }
 
     /// D(m).
-    pub(super) fn eval(&self, m: Vec3) -> f32 {
-        let a = self.alpha2 - 1.0;
-        let d = a / (PI * self.alpha2.ln() * (1.0 + a * m.z * m.z));
-        if d * m.z > 1e-20 { d } else { 0.0 }
+    #[inline(always)]
+    pub(super) fn eval(&self, m: Vec3<F>) -> F {
+        let a = self.alpha2 - F::one();
+        let log = ln(self.alpha2.max(F::splat(f32::MIN_POSITIVE)));
+        let d = a / (F::splat(PI) * log * (F::one() + a * m.z * m.z));
+        F::select(F::splat(1e-20).lt(d * m.z), d, F::zero())
     }
 
     /// Masking and shadowing, with a roughness of ¼ whatever the gloss.
-    pub(super) fn g(&self, wi: Vec3, wo: Vec3) -> f32 {
-        let g1 = |v: Vec3| {
-            let tan2 = (1.0 - v.z * v.z).max(0.0) / (v.z * v.z);
-            2.0 / (1.0 + (1.0 + 0.0625 * tan2).sqrt())
-        };
-        g1(wi) * g1(wo)
+    #[inline(always)]
+    pub(super) fn g(&self, wi: Vec3<F>, wo: Vec3<F>) -> F {
+        Self::g1(wi) * Self::g1(wo)
+    }
+
+    /// The share of facets that `v` sees.
+    #[inline(always)]
+    fn g1(v: Vec3<F>) -> F {
+        let (one, cos2) = (F::one(), v.z * v.z);
+        let tan2 = (one - cos2).max(F::zero()) / cos2;
+        F::splat(2.0) / (one + (one + F::splat(0.0625) * tan2).sqrt())
     }
 
     /// The density of [`Self::sample`].
-    pub(super) fn pdf(&self, m: Vec3) -> f32 {
+    #[inline(always)]
+    pub(super) fn pdf(&self, m: Vec3<F>) -> F {
         self.eval(m) * m.z
     }
 
-    pub(super) fn sample(&self, u: Vec2) -> Vec3 {
-        let cos2 = (1.0 - self.alpha2.powf(1.0 - u.y)) / (1.0 - self.alpha2);
-        let sin = (1.0 - cos2).max(0.0).sqrt();
-        let (s, c) = (TAU * u.x).sin_cos();
-        Vec3::new(c * sin, s * sin, cos2.max(0.0).sqrt())
+    /// Draws a facet's normal by its area projected on the surface.
+    #[inline(always)]
+    pub(super) fn sample(&self, u: Vec2<F>) -> Vec3<F> {
+        let (zero, one) = (F::zero(), F::one());
+        let cos2 = (one - pow(self.alpha2, one - u.y)) / (one - self.alpha2);
+        let sin = (one - cos2).max(zero).sqrt();
+        let (s, c) = sin_cos_turns(u.x);
+        Vec3::new(c * sin, s * sin, cos2.max(zero).sqrt())
     }
 }

@@ -19,9 +19,21 @@ pub(super) struct Boundary<F> {
 /// The boundary with relative index `eta`, met at the signed cosine `cos_i` with its normal.
 #[inline(always)]
 pub(super) fn dielectric<F: Lanes>(cos_i: F, eta: f32) -> Boundary<F> {
+    dielectric_either_way(cos_i, F::splat(eta), F::splat(1.0 / eta))
+}
+
+/// The same where the index varies.
+#[inline(always)]
+pub(super) fn dielectric_lanes<F: Lanes>(cos_i: F, eta: F) -> Boundary<F> {
+    dielectric_either_way(cos_i, eta, F::one() / eta)
+}
+
+/// The same with the index for light from outside and from inside.
+#[inline(always)]
+fn dielectric_either_way<F: Lanes>(cos_i: F, inward: F, outward: F) -> Boundary<F> {
     let (zero, one) = (F::zero(), F::one());
     let front = cos_i.ge(zero);
-    let relative = F::select(front, F::splat(eta), F::splat(1.0 / eta));
+    let relative = F::select(front, inward, outward);
     let sin2_t = (one - cos_i * cos_i) / (relative * relative);
     let cos_t = (one - sin2_t).max(zero).sqrt();
     let cos = cos_i.abs();
@@ -30,7 +42,7 @@ pub(super) fn dielectric<F: Lanes>(cos_i: F, eta: f32) -> Boundary<F> {
     let reflectance = F::splat(0.5) * (s * s + p * p);
     let reflectance = F::select(cos.eq(zero), one, reflectance);
     Boundary {
-        reflectance: if eta == 1.0 { zero } else { reflectance },
+        reflectance: F::select(inward.eq(one), zero, reflectance),
         cos_t: F::select(front, -cos_t, cos_t),
         eta: relative,
     }

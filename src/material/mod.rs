@@ -85,21 +85,6 @@ impl<S: Spectral> PhongTerms<S> {
     }
 }
 
-impl<S: Spectral> BsdfValue<S> {
-    /// The sample that drew `wo` with this density; `None` where that is 0.
-    fn as_sample(self, wo: Vec3, eta: f32) -> Option<BsdfSample<S>> {
-        let usable = self.pdf > 0.0 && self.pdf.is_finite();
-        usable.then(|| BsdfSample {
-            wo,
-            weight: self.value / self.pdf,
-            pdf: self.pdf,
-            eta,
-            delta: false,
-            null: false,
-        })
-    }
-}
-
 /// The ways in which a material scatters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Lobes {

@@ -3,19 +3,17 @@
 //! `clearcoat` (`clearcoat_gloss`) and `sheen`. The index of refraction is `eta`, or follows from
 //! `specular` (0.5).
 
-use glam::{Vec2, Vec3};
-
 use super::disney::{
-    Coat, Parameters, Point, in_use, normal_reflectance, number, rate, sampling_rate, schlick,
+    Coat, Parameters, Point, Schlick, in_use, normal_reflectance, rate, sampling_rate,
 };
-use super::microfacet::Interface;
-use super::{Bsdf, BsdfSample, BsdfValue, Lobes, fresnel};
-use crate::color::{ColorModel, Mono, Spectral};
+use super::microfacet::{self, Interface};
+use super::{BlockBsdf, Bsdf, BsdfSamples, BsdfValues, Lobes, fresnel, single_face};
+use crate::color::{ColorModel, Mono, Spectra};
 use crate::description::Properties;
-use crate::description::declared::{Plugin, float, number as number_row};
+use crate::description::declared::{Plugin, float, number};
 use crate::error::Result;
-use crate::interaction::Interaction;
-use crate::lanes::warp;
+use crate::interaction::Points;
+use crate::lanes::{Lanes, Mask as _, Vec2, Vec3, warp};
 use crate::texture::{Palettes, Texture};
 
 /// Disney's material.
@@ -32,24 +30,24 @@ pub struct Principled<C: ColorModel> {
     diffuse_rate: f32,
 }
 
-/// How much there is of the parts at a point.
+/// How much there is of the parts at points.
 #[derive(Clone, Copy, Debug)]
-struct Mix {
-    metallic: f32,
+struct Mix<F> {
+    metallic: F,
     /// Of the diffuse lobe.
-    matte: f32,
+    matte: F,
     /// Of the glass.
-    glass: f32,
-    clearcoat: f32,
+    glass: F,
+    clearcoat: F,
 }
 
 /// Probabilities of sampling the lobes.
 #[derive(Clone, Copy, Debug)]
-struct Shares {
-    diffuse: f32,
-    clearcoat: f32,
+struct Shares<F> {
+    diffuse: F,
+    clearcoat: F,
     /// Of reflection and refraction at the main facets.
-    specular: f32,
+    specular: F,
 }
 
 impl<C: ColorModel> Principled<C> {
@@ -58,9 +56,9 @@ impl<C: ColorModel> Principled<C> {
         properties: &[
             super::disney::PROPERTIES,
             &[
-                number_row("metallic", 0.0, "0 is a dielectric, 1 a metal"),
-                number_row("clearcoat", 0.0, "how strong a second, clear coat is"),
-                number_row("clearcoat_gloss", 0.0, "how smooth it is"),
+                number("metallic", 0.0, "0 is a dielectric, 1 a metal"),
+                number("clearcoat", 0.0, "how strong a second, clear coat is"),
+                number("clearcoat_gloss", 0.0, "how smooth it is"),
                 float("eta", 1.5, "index of refraction, inside over outside")
                     .positive()
                     .absent("from specular"),
@@ -93,51 +91,55 @@ impl<C: ColorModel> Principled<C> {
         })
     }
 
-    fn mix(&self, at: &Interaction<'_>, point: &Point<C::Sample>) -> Mix {
-        let metallic = number(&self.metallic, at);
+    #[inline(always)]
+    fn mix<F: Lanes>(&self, at: &Points<'_, F>, spec_trans: F) -> Mix<F> {
+        let one = F::one();
+        let metallic = self.metallic.numbers(at);
         Mix {
             metallic,
-            matte: (1.0 - metallic) * (1.0 - point.spec_trans),
-            glass: (1.0 - metallic) * point.spec_trans,
-            clearcoat: number(&self.clearcoat, at),
+            matte: (one - metallic) * (one - spec_trans),
+            glass: (one - metallic) * spec_trans,
+            clearcoat: self.clearcoat.numbers(at),
         }
     }
 
-    /// `None` where nothing is seen: from the inside of what is not glass.
-    fn shares(&self, front: bool, mix: &Mix) -> Option<Shares> {
-        if !front {
-            return (mix.glass > 0.0).then_some(Shares {
-                diffuse: 0.0,
-                clearcoat: 0.0,
-                specular: 1.0,
-            });
+    /// The lobes seen from the front; from the inside it is the main facets alone.
+    #[inline(always)]
+    fn shares<F: Lanes>(&self, front: F::Mask, mix: &Mix<F>) -> Shares<F> {
+        let (zero, one) = (F::zero(), F::one());
+        let diffuse = mix.matte * F::splat(self.diffuse_rate);
+        let clearcoat = F::splat(0.25) * mix.clearcoat * F::splat(self.clearcoat_rate);
+        let total = diffuse + clearcoat + F::splat(self.specular_rate);
+        Shares {
+            diffuse: F::select(front, diffuse / total, zero),
+            clearcoat: F::select(front, clearcoat / total, zero),
+            specular: F::select(front, F::splat(self.specular_rate) / total, one),
         }
-        let diffuse = mix.matte * self.diffuse_rate;
-        let clearcoat = 0.25 * mix.clearcoat * self.clearcoat_rate;
-        let total = diffuse + clearcoat + self.specular_rate;
-        Some(Shares {
-            diffuse: diffuse / total,
-            clearcoat: clearcoat / total,
-            specular: self.specular_rate / total,
-        })
     }
 
     /// The main specular lobe's reflectance for light from the front: metal and tint by Schlick's
     /// approximation.
-    fn reflectance(
+    #[inline(always)]
+    fn reflectance<F: Lanes>(
         &self,
-        point: &Point<C::Sample>,
-        mix: &Mix,
-        cos: f32,
-        fresnel: f32,
-    ) -> C::Sample {
-        let r0 = normal_reflectance(self.eta);
-        let dielectric = 1.0 - mix.metallic;
-        C::Sample::from_fn(|c| {
-            dielectric * (1.0 - point.spec_tint) * fresnel
-                + mix.metallic * schlick(point.base_color[c], cos, self.eta)
-                + dielectric * point.spec_tint * schlick(point.tint[c] * r0, cos, self.eta)
-        })
+        point: &Point<F, C::Columns<F>>,
+        mix: &Mix<F>,
+        schlick: Schlick<F>,
+        fresnel: F,
+    ) -> C::Columns<F> {
+        let one = F::one();
+        let r0 = F::splat(normal_reflectance(self.eta));
+        let dielectric = one - mix.metallic;
+        let untinted = dielectric * (one - point.spec_tint) * fresnel;
+        let tinted = dielectric * point.spec_tint;
+        let mut reflectance = point.base_color;
+        for c in 0..C::Columns::<F>::CHANNELS {
+            let value = untinted
+                + mix.metallic * schlick.reflectance(point.base_color[c])
+                + tinted * schlick.reflectance(point.tint[c] * r0);
+            reflectance = reflectance.with(c, value);
+        }
+        reflectance
     }
 }
 
@@ -168,108 +170,119 @@ impl<C: ColorModel> Bsdf<C> for Principled<C> {
         }
     }
 
-    fn eval(
+    single_face!();
+}
+
+impl<C: ColorModel> BlockBsdf<C> for Principled<C> {
+    #[inline(always)]
+    fn eval_lanes<F: Lanes>(
         &self,
-        at: &Interaction<'_>,
-        wi: Vec3,
-        wo: Vec3,
-        w: &C::Wavelengths,
-    ) -> Option<BsdfValue<C::Sample>> {
-        let front = wi.z > 0.0;
-        let interface = Interface::<f32>::between(wi.into(), wo.into(), self.eta);
-        if !interface.found {
-            return None;
-        }
+        at: &Points<'_, F>,
+        wi: Vec3<F>,
+        wo: Vec3<F>,
+        w: &[C::Wavelengths],
+    ) -> BsdfValues<F, C::Columns<F>> {
+        let (zero, one) = (F::zero(), F::one());
+        let front = zero.lt(wi.z);
+        let interface = Interface::between(wi, wo, self.eta);
+        let (m, jacobian) = (interface.m, interface.jacobian);
         let point = self.parameters.at(at, w);
-        let mix = self.mix(at, &point);
-        let shares = self.shares(front, &mix)?;
-        let m = Vec3::from(interface.m);
+        let mix = self.mix(at, point.spec_trans);
+        let shares = self.shares::<F>(front, &mix);
         let (cos_i, cos_o) = (wi.z.abs(), wo.z.abs());
         let (cos_m, cos_d) = (wi.dot(m), wo.dot(m));
         let fresnel = fresnel::dielectric(cos_m, self.eta).reflectance;
-        let distribution = point.distribution(1.0);
-        let scale = distribution.eval(m.into())
-            * distribution.g(wi.into(), wo.into(), m.into())
-            * interface.jacobian
-            * cos_m.abs()
-            / cos_i;
-        let facets = distribution.pdf((wi * wi.z.signum()).into(), m.into()) * interface.jacobian;
+        let distribution = point.distribution(one);
+        let dg = distribution.eval(m) * distribution.g(wi, wo, m);
+        let scale = dg * jacobian * cos_m.abs() / cos_i;
+        let facets = distribution.pdf(microfacet::in_front(wi), m) * jacobian;
         // Light refracted or reflected by the main facets; metal only reflects.
-        let transmitted = if front {
-            mix.glass * (1.0 - fresnel)
-        } else {
-            1.0 - fresnel
+        let passing = one - fresnel;
+        let transmitted = F::select(front, mix.glass * passing, passing);
+
+        let schlick = Schlick::new(cos_m, F::splat(self.eta));
+        let diffuse = point.diffuse(cos_i, cos_o, cos_d) * (mix.matte * cos_o);
+        let sheen = point.sheen(cos_d) * ((one - mix.metallic) * cos_o);
+        let matte = diffuse + sheen;
+        let main = self.reflectance(&point, &mix, schlick, fresnel) * scale;
+        let mut value = C::Columns::<F>::select(zero.lt(fresnel), matte + main, matte);
+        let main_pdf = shares.specular * (one - transmitted) * facets;
+        let mut pdf = main_pdf + shares.diffuse * warp::cosine_hemisphere_pdf(wo.z);
+        let coated = zero.lt(mix.clearcoat);
+        if (coated & at.active).any() {
+            let coat = Coat::new(self.clearcoat_gloss.numbers(at));
+            let share = schlick.reflectance(F::splat(0.04)) * coat.eval(m) * coat.g(wi, wo);
+            let share = F::splat(0.25) * mix.clearcoat * share * cos_o;
+            let with_coat = value + C::Columns::<F>::splat(share);
+            value = C::Columns::<F>::select(coated, with_coat, value);
+            let with_coat = pdf + shares.clearcoat * coat.pdf(m) * jacobian;
+            pdf = F::select(coated, with_coat, pdf);
+        }
+        let outside = BsdfValues { value, pdf };
+        let reflected = interface.found & interface.reflection;
+        if !self.transmits {
+            return outside.only(reflected & front);
+        }
+
+        let inside = BsdfValues {
+            value: C::Columns::<F>::splat(mix.glass * fresnel * scale),
+            pdf: main_pdf,
         };
-        if !interface.reflection {
-            let scale = scale * mix.glass * (1.0 - fresnel) / (interface.eta * interface.eta);
-            let pdf = shares.specular * transmitted * facets;
-            return (pdf > 0.0).then(|| BsdfValue {
-                value: point.base_color.map(|v| v.max(0.0).sqrt() * scale),
-                pdf,
-            });
+        let scale = scale * mix.glass * passing / (interface.eta * interface.eta);
+        let mut value = point.base_color;
+        for c in 0..C::Columns::<F>::CHANNELS {
+            value = value.with(c, value[c].max(zero).sqrt() * scale);
         }
-        let mut pdf = shares.specular * (1.0 - transmitted) * facets;
-        if !front {
-            let value = C::Sample::splat(mix.glass * fresnel * scale);
-            return (pdf > 0.0).then_some(BsdfValue { value, pdf });
-        }
-        let mut value = point.diffuse(cos_i, cos_o, cos_d) * (mix.matte * cos_o)
-            + point.sheen(cos_d) * ((1.0 - mix.metallic) * cos_o);
-        if fresnel > 0.0 {
-            value += self.reflectance(&point, &mix, cos_m, fresnel) * scale;
-        }
-        pdf += shares.diffuse * warp::cosine_hemisphere_pdf(wo.z);
-        if mix.clearcoat > 0.0 {
-            let coat = Coat::new(number(&self.clearcoat_gloss, at));
-            let coated = schlick(0.04, cos_m, self.eta) * coat.eval(m) * coat.g(wi, wo);
-            value += C::Sample::splat(0.25 * mix.clearcoat * coated * cos_o);
-            pdf += shares.clearcoat * coat.pdf(m) * interface.jacobian;
-        }
-        Some(BsdfValue { value, pdf })
+        let refracted = BsdfValues {
+            value,
+            pdf: shares.specular * transmitted * facets,
+        };
+        let other = BsdfValues::select(interface.reflection, inside, refracted);
+        // Only glass is seen from the inside.
+        let seen = front | zero.lt(mix.glass);
+        let other = other.only(interface.found & seen & zero.lt(other.pdf));
+        BsdfValues::select(reflected & front, outside, other)
     }
 
-    fn sample(
+    #[inline(always)]
+    fn sample_lanes<F: Lanes>(
         &self,
-        at: &Interaction<'_>,
-        wi: Vec3,
-        u1: f32,
-        u2: Vec2,
-        w: &C::Wavelengths,
-    ) -> Option<BsdfSample<C::Sample>> {
-        if wi.z == 0.0 {
-            return None;
-        }
+        at: &Points<'_, F>,
+        wi: Vec3<F>,
+        u1: F,
+        u2: Vec2<F>,
+        w: &[C::Wavelengths],
+    ) -> BsdfSamples<F, C::Columns<F>> {
+        let (zero, one) = (F::zero(), F::one());
+        let front = zero.lt(wi.z);
         let point = self.parameters.at(at, w);
-        let mix = self.mix(at, &point);
-        let front = wi.z > 0.0;
-        let shares = self.shares(front, &mix)?;
-        let (mut eta, mut reflected) = (1.0, true);
-        let wo = if u1 < shares.diffuse {
-            Vec3::from(warp::cosine_hemisphere(u2.into()))
-        } else if u1 < shares.diffuse + shares.clearcoat {
-            let coat = Coat::new(number(&self.clearcoat_gloss, at));
-            Vec3::from(fresnel::reflect(wi.into(), coat.sample(u2).into()))
-        } else {
-            let m = Vec3::from(
-                point
-                    .distribution(1.0)
-                    .sample((wi * wi.z.signum()).into(), u2.into()),
-            );
-            let boundary = fresnel::dielectric(wi.dot(m), self.eta);
-            let passing = 1.0 - boundary.reflectance;
-            let passing = if front { mix.glass * passing } else { passing };
-            let u = (u1 - shares.diffuse - shares.clearcoat) / shares.specular;
-            if u < passing {
-                eta = boundary.eta;
-                reflected = false;
-                Vec3::from(fresnel::refract(wi.into(), m.into(), &boundary))
-            } else {
-                Vec3::from(fresnel::reflect((wi).into(), m.into()))
-            }
-        };
-        if (wo.z * wi.z > 0.0) != reflected {
-            return None; // the facet sends the light to the wrong side of the surface
+        let mix = self.mix(at, point.spec_trans);
+        let shares = self.shares::<F>(front, &mix);
+        let m = point.distribution(one).sample(microfacet::in_front(wi), u2);
+        let boundary = fresnel::dielectric(wi.dot(m), self.eta);
+        let passing = one - boundary.reflectance;
+        let passing = F::select(front, mix.glass * passing, passing);
+        let u = (u1 - shares.diffuse - shares.clearcoat) / shares.specular;
+        let matte = u1.lt(shares.diffuse);
+        let main = !u1.lt(shares.diffuse + shares.clearcoat);
+        let refracted = main & !matte & u.lt(passing);
+        let mut wo = Vec3::select(
+            refracted,
+            fresnel::refract(wi, m, &boundary),
+            fresnel::reflect(wi, m),
+        );
+        if (!main & !matte & at.active).any() {
+            let coat = Coat::new(self.clearcoat_gloss.numbers(at));
+            wo = Vec3::select(main, wo, fresnel::reflect(wi, coat.sample(u2)));
         }
-        self.eval(at, wi, wo, w)?.as_sample(wo, eta)
+        wo = Vec3::select(matte, warp::cosine_hemisphere(u2), wo);
+        let eta = F::select(refracted, boundary.eta, one);
+        let samples = self.eval_lanes(at, wi, wo, w).as_samples(wo, eta);
+        // Other facets send the light to the wrong side of the surface.
+        let fits = refracted ^ zero.lt(wo.z * wi.z);
+        BsdfSamples {
+            drawn: samples.drawn & fits,
+            ..samples
+        }
     }
 }

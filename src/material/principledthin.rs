@@ -2,19 +2,17 @@
 //! reflected or passes without being bent, by GGX lobes as far as `spec_trans` goes and diffusely
 //! otherwise, on either side by `diff_trans` (0 to 2, where 1 is half). `eta` (1.5) may be a texture.
 
-use glam::{Vec2, Vec3};
-
 use super::disney::{
-    Parameters, Point, in_use, lerp, normal_reflectance, number, rate, sampling_rate, schlick,
+    Parameters, Point, Schlick, in_use, lerp, normal_reflectance, rate, sampling_rate,
 };
 use super::microfacet::Distribution;
-use super::{Bsdf, BsdfSample, BsdfValue, Lobes, fresnel};
-use crate::color::{ColorModel, Mono, Spectral};
+use super::{BlockBsdf, Bsdf, BsdfSamples, BsdfValues, Lobes, fresnel, single_face};
+use crate::color::{ColorModel, Mono, Spectra};
 use crate::description::Properties;
-use crate::description::declared::{Plugin, number as number_row};
+use crate::description::declared::{Plugin, number};
 use crate::error::Result;
-use crate::interaction::Interaction;
-use crate::lanes::warp;
+use crate::interaction::Points;
+use crate::lanes::{Lanes, Vec2, Vec3, warp};
 use crate::texture::{Palettes, Texture};
 
 /// Disney's thin material.
@@ -32,11 +30,11 @@ pub struct PrincipledThin<C: ColorModel> {
 
 /// Probabilities of sampling the lobes.
 #[derive(Clone, Copy, Debug)]
-struct Shares {
-    specular_reflection: f32,
-    specular_transmission: f32,
-    diffuse_reflection: f32,
-    diffuse_transmission: f32,
+struct Shares<F> {
+    specular_reflection: F,
+    specular_transmission: F,
+    diffuse_reflection: F,
+    diffuse_transmission: F,
 }
 
 impl<C: ColorModel> PrincipledThin<C> {
@@ -45,8 +43,8 @@ impl<C: ColorModel> PrincipledThin<C> {
         properties: &[
             super::disney::PROPERTIES,
             &[
-                number_row("eta", 1.5, "index of refraction, inside over outside"),
-                number_row("diff_trans", 0.0, "matte transmission: 0 is none, 2 is all"),
+                number("eta", 1.5, "index of refraction, inside over outside"),
+                number("diff_trans", 0.0, "matte transmission: 0 is none, 2 is all"),
                 sampling_rate("specular_reflectance_sampling_rate"),
                 sampling_rate("specular_transmittance_sampling_rate"),
                 sampling_rate("diffuse_reflectance_sampling_rate"),
@@ -70,19 +68,20 @@ impl<C: ColorModel> PrincipledThin<C> {
     }
 
     /// The diffusely transmitted part, in [0, 1].
-    fn diff_trans(&self, at: &Interaction<'_>) -> f32 {
-        0.5 * number(&self.diff_trans, at)
+    #[inline(always)]
+    fn diff_trans<F: Lanes>(&self, at: &Points<'_, F>) -> F {
+        F::splat(0.5) * self.diff_trans.numbers(at)
     }
 
-    fn shares(&self, spec_trans: f32, diff_trans: f32) -> Shares {
-        let specular = 0.5 * spec_trans;
-        let diffuse = 1.0 - spec_trans;
-        let [a, b, c, d] = [
-            specular * self.specular_reflectance_rate,
-            specular * self.specular_transmittance_rate,
-            diffuse * (1.0 - diff_trans) * self.diffuse_reflectance_rate,
-            diffuse * diff_trans * self.diffuse_transmittance_rate,
-        ];
+    #[inline(always)]
+    fn shares<F: Lanes>(&self, spec_trans: F, diff_trans: F) -> Shares<F> {
+        let one = F::one();
+        let specular = F::splat(0.5) * spec_trans;
+        let diffuse = one - spec_trans;
+        let a = specular * F::splat(self.specular_reflectance_rate);
+        let b = specular * F::splat(self.specular_transmittance_rate);
+        let c = diffuse * (one - diff_trans) * F::splat(self.diffuse_reflectance_rate);
+        let d = diffuse * diff_trans * F::splat(self.diffuse_transmittance_rate);
         let total = a + b + c + d;
         Shares {
             specular_reflection: a / total,
@@ -91,16 +90,17 @@ impl<C: ColorModel> PrincipledThin<C> {
             diffuse_transmission: d / total,
         }
     }
-
-    /// The facets at which light passes, which the two boundaries make rougher or smoother.
-    fn passing(point: &Point<C::Sample>, eta: f32) -> Distribution<f32> {
-        point.distribution(0.65 * eta - 0.35)
-    }
 }
 
-/// The mirror image on the other side of the surface.
-fn through(wo: Vec3) -> Vec3 {
-    Vec3::new(wo.x, wo.y, -wo.z)
+/// The facets that reflect light, or at which it passes, which the two boundaries make rougher or smoother.
+#[inline(always)]
+fn facets<F: Lanes, S: Spectra<F>>(
+    point: &Point<F, S>,
+    reflect: F::Mask,
+    eta: F,
+) -> Distribution<F> {
+    let passing = F::splat(0.65) * eta - F::splat(0.35);
+    point.distribution(F::select(reflect, F::one(), passing))
 }
 
 impl<C: ColorModel> Bsdf<C> for PrincipledThin<C> {
@@ -111,96 +111,101 @@ impl<C: ColorModel> Bsdf<C> for PrincipledThin<C> {
         }
     }
 
-    fn eval(
+    single_face!();
+}
+
+impl<C: ColorModel> BlockBsdf<C> for PrincipledThin<C> {
+    #[inline(always)]
+    fn eval_lanes<F: Lanes>(
         &self,
-        at: &Interaction<'_>,
-        wi: Vec3,
-        wo: Vec3,
-        w: &C::Wavelengths,
-    ) -> Option<BsdfValue<C::Sample>> {
-        if wi.z * wo.z == 0.0 {
-            return None;
-        }
+        at: &Points<'_, F>,
+        wi: Vec3<F>,
+        wo: Vec3<F>,
+        w: &[C::Wavelengths],
+    ) -> BsdfValues<F, C::Columns<F>> {
+        let (zero, one) = (F::zero(), F::one());
         // Both sides are alike.
-        let (wi, wo) = (wi * wi.z.signum(), wo * wi.z.signum());
+        let up = one.copysign(wi.z);
+        let (wi, wo) = (wi * up, wo * up);
+        let seen = !(wi.z * wo.z).eq(zero);
         let point = self.parameters.at(at, w);
-        let (eta, diff_trans) = (number(&self.eta, at), self.diff_trans(at));
+        let (eta, diff_trans) = (self.eta.numbers(at), self.diff_trans(at));
         let shares = self.shares(point.spec_trans, diff_trans);
-        let reflection = wo.z > 0.0;
-        let mirrored = if reflection { wo } else { through(wo) };
+        let reflection = zero.lt(wo.z);
+        let cos_o = wo.z.abs();
+        let mirrored = Vec3::new(wo.x, wo.y, cos_o);
         let m = (wi + mirrored).normalize();
-        let cos_o = mirrored.z;
-        let fresnel = fresnel::dielectric(wi.dot(m), eta).reflectance;
-        let jacobian = 0.25 / mirrored.dot(m);
-        let matte = 1.0 - point.spec_trans;
-        if reflection {
-            let distribution = point.distribution(1.0);
-            let dg = distribution.eval(m.into()) * distribution.g(wi.into(), wo.into(), m.into());
-            let specular = point.spec_trans * dg / (4.0 * wi.z);
-            let r0 = normal_reflectance(eta);
-            let reflected = point.tint.map(|tint| {
-                let tinted = schlick(tint * r0, wi.dot(m), eta);
-                specular * lerp(fresnel, tinted, point.spec_tint)
-            });
-            let cos_d = wo.dot(m);
-            let diffuse = point.diffuse(wi.z, cos_o, cos_d) + point.sheen(cos_d);
-            return Some(BsdfValue {
-                value: reflected + diffuse * (matte * (1.0 - diff_trans) * cos_o),
-                pdf: shares.specular_reflection * distribution.pdf(wi.into(), m.into()) * jacobian
-                    + shares.diffuse_reflection * warp::cosine_hemisphere_pdf(cos_o),
-            });
-        }
+        let cos_m = wi.dot(m);
+        let fresnel = fresnel::dielectric_lanes(cos_m, eta).reflectance;
+        let matte = one - point.spec_trans;
+        let distribution = facets(&point, reflection, eta);
+        let dg = distribution.eval(m) * distribution.g(wi, wo, m);
+        let specular = point.spec_trans * dg / (F::splat(4.0) * wi.z);
+        let facets_pdf = distribution.pdf(wi, m) * (F::splat(0.25) / mirrored.dot(m));
         let cosine_pdf = warp::cosine_hemisphere_pdf(cos_o);
-        let mut value = matte * diff_trans * cosine_pdf;
-        let mut pdf = shares.diffuse_transmission * cosine_pdf;
-        // Mitsuba leaves out facets that would be seen from behind on the other side.
-        if wo.dot(m) < 0.0 {
-            let distribution = Self::passing(&point, eta);
-            let dg = distribution.eval(m.into()) * distribution.g(wi.into(), wo.into(), m.into());
-            value += point.spec_trans * (1.0 - fresnel) * dg / (4.0 * wi.z);
-            pdf += shares.specular_transmission * distribution.pdf(wi.into(), m.into()) * jacobian;
+
+        let (schlick, r0) = (Schlick::new(cos_m, eta), normal_reflectance(eta));
+        let mut mirror = point.tint;
+        for c in 0..C::Columns::<F>::CHANNELS {
+            let tinted = schlick.reflectance(point.tint[c] * r0);
+            mirror = mirror.with(c, specular * lerp(fresnel, tinted, point.spec_tint));
         }
-        (pdf > 0.0).then(|| BsdfValue {
-            value: point.base_color * value,
-            pdf,
-        })
+        let cos_d = wo.dot(m);
+        let diffuse = point.diffuse(wi.z, cos_o, cos_d) + point.sheen(cos_d);
+        let reflected = BsdfValues {
+            value: mirror + diffuse * (matte * (one - diff_trans) * cos_o),
+            pdf: shares.specular_reflection * facets_pdf + shares.diffuse_reflection * cosine_pdf,
+        };
+        if !self.transmits {
+            return reflected.only(seen & reflection);
+        }
+
+        let diffuse = matte * diff_trans * cosine_pdf;
+        let diffuse_pdf = shares.diffuse_transmission * cosine_pdf;
+        let both = diffuse + specular * (one - fresnel);
+        let both_pdf = diffuse_pdf + shares.specular_transmission * facets_pdf;
+        // Mitsuba leaves out facets that would be seen from behind on the other side.
+        let specular = cos_d.lt(zero);
+        let passing = BsdfValues {
+            value: point.base_color * F::select(specular, both, diffuse),
+            pdf: F::select(specular, both_pdf, diffuse_pdf),
+        };
+        let passing = passing.only(zero.lt(passing.pdf));
+        BsdfValues::select(reflection, reflected, passing).only(seen)
     }
 
-    fn sample(
+    #[inline(always)]
+    fn sample_lanes<F: Lanes>(
         &self,
-        at: &Interaction<'_>,
-        wi: Vec3,
-        u1: f32,
-        u2: Vec2,
-        w: &C::Wavelengths,
-    ) -> Option<BsdfSample<C::Sample>> {
-        if wi.z == 0.0 {
-            return None;
-        }
-        let up = wi.z.signum();
+        at: &Points<'_, F>,
+        wi: Vec3<F>,
+        u1: F,
+        u2: Vec2<F>,
+        w: &[C::Wavelengths],
+    ) -> BsdfSamples<F, C::Columns<F>> {
+        let zero = F::zero();
+        let up = F::one().copysign(wi.z);
+        let upward = wi * up;
         let point = self.parameters.at(at, w);
         let shares = self.shares(point.spec_trans, self.diff_trans(at));
         let passed = shares.specular_reflection + shares.specular_transmission;
-        // Whether light comes out on the side of the surface, and of its facet, that it should.
-        let (wo, fits) = if u1 < shares.specular_reflection {
-            let m = Vec3::from(point.distribution(1.0).sample((wi * up).into(), u2.into()));
-            let wo = Vec3::from(fresnel::reflect((wi * up).into(), m.into()));
-            (wo, wo.z > 0.0)
-        } else if u1 < passed {
-            let m = Vec3::from(
-                Self::passing(&point, number(&self.eta, at)).sample((wi * up).into(), u2.into()),
-            );
-            let wo = through(Vec3::from(fresnel::reflect((wi * up).into(), m.into())));
-            (wo, wo.z < 0.0 && wo.dot(m) < 0.0)
-        } else if u1 < passed + shares.diffuse_reflection {
-            (Vec3::from(warp::cosine_hemisphere(u2.into())), true)
-        } else {
-            (-Vec3::from(warp::cosine_hemisphere(u2.into())), true)
-        };
-        if !fits {
-            return None;
-        }
+        let mirror = u1.lt(shares.specular_reflection);
+        let specular = mirror | u1.lt(passed);
+        let above = u1.lt(passed + shares.diffuse_reflection);
+        let m = facets(&point, mirror, self.eta.numbers(at)).sample(upward, u2);
+        let reflected = fresnel::reflect(upward, m);
+        let through = Vec3::new(reflected.x, reflected.y, -reflected.z);
+        let cosine = warp::cosine_hemisphere(u2);
+        let diffuse = Vec3::select(above, cosine, -cosine);
+        let faceted = Vec3::select(mirror, reflected, through);
+        let wo = Vec3::select(specular, faceted, diffuse);
+        // Light must come out on the side of the surface, and of its facet, that it should.
+        let fits = !specular | (zero.lt(reflected.z) & (mirror | wo.dot(m).lt(zero)));
         let wo = wo * up;
-        self.eval(at, wi, wo, w)?.as_sample(wo, 1.0)
+        let samples = self.eval_lanes(at, wi, wo, w).as_samples(wo, F::one());
+        BsdfSamples {
+            drawn: samples.drawn & fits,
+            ..samples
+        }
     }
 }
