@@ -90,10 +90,11 @@ impl<F: Lanes> Points<'_, F> {
         }
     }
 
-    /// A lane's point as textures see it.
+    /// A lane's point as textures see it, by the rows of the texture coordinates: whoever goes through the lanes in a
+    /// closure must not take them out of registers there.
     #[inline(always)]
-    pub fn texture_point(&self, lane: usize) -> Interaction<'_> {
-        let mut at = Interaction::at_uv(self.uv.lane(lane));
+    pub fn texture_point(&self, lane: usize, [u, v]: &[F::Row; 2]) -> Interaction<'_> {
+        let mut at = Interaction::at_uv(glam::Vec2::new(u[lane], v[lane]));
         if let Some((mesh, primitive, barycentric)) = self.source.on_mesh(lane) {
             (at.mesh, at.primitive, at.barycentric) = (Some(mesh), primitive, barycentric);
         }

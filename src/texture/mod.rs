@@ -103,12 +103,12 @@ impl<C: ColorModel, F: Lanes> Call<F> for LookUp<'_, C, F> {
     /// The values of lanes that are there, one by one.
     #[inline(always)]
     fn run(self) -> C::Columns<F> {
-        let there = self.at.active.to_bits();
+        let (there, uv) = (self.at.active.to_bits(), self.at.uv.rows());
         Spectra::from_samples(|lane| {
             if there >> lane & 1 == 0 {
                 return C::Sample::zero();
             }
-            let (at, w) = (self.at.texture_point(lane), &self.wavelengths[lane]);
+            let (at, w) = (self.at.texture_point(lane, &uv), &self.wavelengths[lane]);
             match self.texture {
                 Texture::Bitmap(bitmap) => bitmap.eval(&at, w),
                 other => other.eval(&at, w),

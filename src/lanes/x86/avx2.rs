@@ -271,11 +271,9 @@ unsafe fn halves(mask: M8) -> (__m256d, __m256d) {
     // SAFETY: the caller's word.
     unsafe {
         let bits = _mm256_castps_si256(mask.0);
-        let half = |bits| _mm256_castsi256_pd(_mm256_cvtepi32_epi64(bits));
-        (
-            half(_mm256_castsi256_si128(bits)),
-            half(_mm256_extracti128_si256::<1>(bits)),
-        )
+        let low = _mm256_cvtepi32_epi64(_mm256_castsi256_si128(bits));
+        let high = _mm256_cvtepi32_epi64(_mm256_extracti128_si256::<1>(bits));
+        (_mm256_castsi256_pd(low), _mm256_castsi256_pd(high))
     }
 }
 
