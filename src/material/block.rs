@@ -1,9 +1,8 @@
-//! Materials in lanes: what a block of paths meets, all of one material. A material that is written over lanes is
-//! written once: its face for single points is the same code with one lane. Those that are not yet are asked lane by
-//! lane.
+//! Materials in lanes: what a block of paths meets, all of one material. A material is written once: its face for
+//! single points is the same code with one lane.
 
-use super::{Bsdf, BsdfSample, BsdfValue, Material};
-use crate::color::{ColorModel, Spectra, Spectral};
+use super::{BsdfSample, BsdfValue, Material};
+use crate::color::{ColorModel, Spectra};
 use crate::interaction::Points;
 use crate::lanes::{Call, Lanes, Mask as _, Vec2, Vec3};
 
@@ -117,7 +116,7 @@ impl<F: Lanes, S: Spectra<F>> BsdfSamples<F, S> {
     }
 }
 
-/// A material that is written over lanes. Wavelengths are given from the first lane on.
+/// A material in lanes. Wavelengths are given from the first lane on.
 pub(super) trait BlockBsdf<C: ColorModel> {
     /// [`Bsdf::eval`]; none where all lobes are single directions.
     #[inline(always)]
@@ -142,7 +141,7 @@ pub(super) trait BlockBsdf<C: ColorModel> {
     ) -> BsdfSamples<F, C::Columns<F>>;
 }
 
-/// The face for single points of a material that is written over lanes.
+/// The face for single points of a material that is written in lanes.
 macro_rules! single_face {
     () => {
         fn eval(
@@ -230,10 +229,12 @@ impl<C: ColorModel, F: Lanes> Call<F> for Eval<'_, C, F> {
         } = self;
         match material {
             Material::BlendBsdf(m) => m.eval_lanes(at, wi, wo, w),
+            Material::BumpMap(m) => m.eval_lanes(at, wi, wo, w),
             Material::Conductor(m) => m.eval_lanes(at, wi, wo, w),
             Material::Dielectric(m) => m.eval_lanes(at, wi, wo, w),
             Material::Diffuse(m) => m.eval_lanes(at, wi, wo, w),
             Material::Mask(m) => m.eval_lanes(at, wi, wo, w),
+            Material::NormalMap(m) => m.eval_lanes(at, wi, wo, w),
             Material::Null(m) => BlockBsdf::<C>::eval_lanes(m, at, wi, wo, w),
             Material::Phong(m) => m.eval_lanes(at, wi, wo, w),
             Material::Plastic(m) => m.eval_lanes(at, wi, wo, w),
@@ -244,7 +245,6 @@ impl<C: ColorModel, F: Lanes> Call<F> for Eval<'_, C, F> {
             Material::RoughPlastic(m) => m.eval_lanes(at, wi, wo, w),
             Material::ThinDielectric(m) => m.eval_lanes(at, wi, wo, w),
             Material::TwoSided(m) => m.eval_lanes(at, wi, wo, w),
-            other => eval_each::<C, F>(&**other, at, wi, wo, w),
         }
     }
 }
@@ -274,10 +274,12 @@ impl<C: ColorModel, F: Lanes> Call<F> for Draw<'_, C, F> {
         } = self;
         match material {
             Material::BlendBsdf(m) => m.sample_lanes(at, wi, u1, u2, w),
+            Material::BumpMap(m) => m.sample_lanes(at, wi, u1, u2, w),
             Material::Conductor(m) => m.sample_lanes(at, wi, u1, u2, w),
             Material::Dielectric(m) => m.sample_lanes(at, wi, u1, u2, w),
             Material::Diffuse(m) => m.sample_lanes(at, wi, u1, u2, w),
             Material::Mask(m) => m.sample_lanes(at, wi, u1, u2, w),
+            Material::NormalMap(m) => m.sample_lanes(at, wi, u1, u2, w),
             Material::Null(m) => BlockBsdf::<C>::sample_lanes(m, at, wi, u1, u2, w),
             Material::Phong(m) => m.sample_lanes(at, wi, u1, u2, w),
             Material::Plastic(m) => m.sample_lanes(at, wi, u1, u2, w),
@@ -288,7 +290,6 @@ impl<C: ColorModel, F: Lanes> Call<F> for Draw<'_, C, F> {
             Material::RoughPlastic(m) => m.sample_lanes(at, wi, u1, u2, w),
             Material::ThinDielectric(m) => m.sample_lanes(at, wi, u1, u2, w),
             Material::TwoSided(m) => m.sample_lanes(at, wi, u1, u2, w),
-            other => sample_each::<C, F>(&**other, at, wi, u1, u2, w),
         }
     }
 }
@@ -330,78 +331,5 @@ impl<C: ColorModel> Material<C> {
             u2,
             w,
         })
-    }
-}
-
-/// The values of a material that is asked lane by lane.
-#[inline(always)]
-fn eval_each<C: ColorModel, F: Lanes>(
-    bsdf: &dyn Bsdf<C>,
-    at: &Points<'_, F>,
-    wi: Vec3<F>,
-    wo: Vec3<F>,
-    w: &[C::Wavelengths],
-) -> BsdfValues<F, C::Columns<F>> {
-    let (there, mut pdf) = (at.active.to_bits(), F::ROW);
-    let value = Spectra::from_samples(|lane| {
-        let value = if there >> lane & 1 == 1 {
-            bsdf.eval(&at.lane(lane), wi.lane(lane), wo.lane(lane), &w[lane])
-        } else {
-            None
-        };
-        match value {
-            Some(value) => {
-                pdf[lane] = value.pdf;
-                value.value
-            }
-            None => C::Sample::zero(),
-        }
-    });
-    BsdfValues {
-        value,
-        pdf: F::load(&pdf),
-    }
-}
-
-/// Directions drawn from a material that is asked lane by lane.
-#[inline(always)]
-fn sample_each<C: ColorModel, F: Lanes>(
-    bsdf: &dyn Bsdf<C>,
-    at: &Points<'_, F>,
-    wi: Vec3<F>,
-    u1: F,
-    u2: Vec2<F>,
-    w: &[C::Wavelengths],
-) -> BsdfSamples<F, C::Columns<F>> {
-    let there = at.active.to_bits();
-    let (mut drawn, mut delta, mut null) = (0, 0, 0);
-    let (mut wo, mut pdf, mut eta) = ([F::ROW; 3], F::ROW, F::ROW);
-    let weight = Spectra::from_samples(|lane| {
-        let sample = if there >> lane & 1 == 1 {
-            let (u1, u2) = (u1.lane(lane), u2.lane(lane));
-            bsdf.sample(&at.lane(lane), wi.lane(lane), u1, u2, &w[lane])
-        } else {
-            None
-        };
-        let Some(sample) = sample else {
-            return C::Sample::zero();
-        };
-        drawn |= 1 << lane;
-        delta |= u32::from(sample.delta) << lane;
-        null |= u32::from(sample.null) << lane;
-        for (row, value) in wo.iter_mut().zip(sample.wo.to_array()) {
-            row[lane] = value;
-        }
-        (pdf[lane], eta[lane]) = (sample.pdf, sample.eta);
-        sample.weight
-    });
-    BsdfSamples {
-        drawn: F::Mask::from_bits(drawn),
-        wo: Vec3::<F>::load(&wo),
-        weight,
-        pdf: F::load(&pdf),
-        eta: F::load(&eta),
-        delta: F::Mask::from_bits(delta),
-        null: F::Mask::from_bits(null),
     }
 }

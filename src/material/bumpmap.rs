@@ -1,14 +1,13 @@
 //! `bumpmap`: tilts the normal of the nested material as if the surface were raised along it by the
 //! nested texture times `scale` (1), in scene units (Blinn, *Simulation of wrinkled surfaces*, 1978).
 
-use glam::Vec3;
-
-use super::perturbed::{Normals, Perturbed};
+use super::perturbed::{Normals, Perturbed, unit_or_up};
 use crate::color::{ColorModel, Mono, Role};
 use crate::description::declared::{Plugin, float, nested};
 use crate::description::{Kind, Properties};
 use crate::error::Result;
-use crate::interaction::Interaction;
+use crate::interaction::Points;
+use crate::lanes::{Lanes, Vec2, Vec3};
 use crate::texture::{Palettes, Texture};
 
 /// A material on a surface with bumps.
@@ -50,14 +49,36 @@ impl<C: ColorModel> BumpMap<C> {
     }
 }
 
+impl Bumps {
+    /// How the height changes with u and with v.
+    #[inline(always)]
+    fn slopes<F: Lanes>(&self, at: &Points<'_, F>) -> Vec2<F> {
+        let (uv, mut slopes) = (at.uv.rows(), [F::ROW; 2]);
+        for lane in at.lanes() {
+            let gradient = self.height.gradient(&at.texture_point(lane, &uv), &());
+            for (row, slope) in slopes.iter_mut().zip(gradient) {
+                row[lane] = slope[0];
+            }
+        }
+        Vec2::<F>::load(&slopes) * F::splat(self.scale)
+    }
+}
+
+/// `d` where the surface is raised by `slope` along it.
+#[inline(always)]
+fn raised<F: Lanes>(n: Vec3<F>, d: Vec3<F>, slope: F) -> Vec3<F> {
+    d + n * (slope - n.dot(d))
+}
+
 impl Normals for Bumps {
-    fn normal(&self, at: &Interaction<'_>) -> (Vec3, Vec3) {
-        let [along_u, along_v] = self.height.gradient(at, &()).map(|s| s[0] * self.scale);
-        let n = at.frame.n;
-        let along = |d: Vec3, slope: f32| d + n * (slope - n.dot(d));
-        let raised = along(at.dp_du, along_u).cross(along(at.dp_dv, along_v));
-        let raised = at.frame.to_local(raised * raised.dot(at.normal).signum());
-        let raised = raised.try_normalize().unwrap_or(Vec3::Z);
-        (raised, at.frame.to_local(at.dp_du))
+    #[inline(always)]
+    fn normals<F: Lanes>(&self, at: &Points<'_, F>) -> (Vec3<F>, Vec3<F>) {
+        let slopes = self.slopes(at);
+        let along_u = raised(at.frame.n, at.dp_du, slopes.x);
+        let along_v = raised(at.frame.n, at.dp_dv, slopes.y);
+        let normal = along_u.cross(along_v);
+        let outward = F::one().copysign(normal.dot(at.normal));
+        let normal = unit_or_up(at.frame.to_local(normal * outward));
+        (normal, at.frame.to_local(at.dp_du))
     }
 }

@@ -1,14 +1,13 @@
 //! `normalmap`: turns the normal of the nested material to that of the texture `normalmap`, whose values
 //! in [0, 1] stand for components in [−1, 1] in the shading frame; images want `raw`.
 
-use glam::Vec3;
-
 use super::perturbed::{Normals, Perturbed};
 use crate::color::{ColorModel, Rgb, Role};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, map};
 use crate::error::Result;
-use crate::interaction::Interaction;
+use crate::interaction::Points;
+use crate::lanes::{Lanes, MAX_LANES, Vec3};
 use crate::texture::{Palettes, Texture};
 
 /// A material on a surface with given normals.
@@ -41,8 +40,11 @@ impl<C: ColorModel> NormalMap<C> {
 }
 
 impl Normals for Mapped {
-    fn normal(&self, at: &Interaction<'_>) -> (Vec3, Vec3) {
-        let value = self.0.eval(at, &());
-        (Vec3::from_array(value.0) * 2.0 - 1.0, Vec3::X)
+    #[inline(always)]
+    fn normals<F: Lanes>(&self, at: &Points<'_, F>) -> (Vec3<F>, Vec3<F>) {
+        let value = self.0.eval_lanes(at, &[(); MAX_LANES]);
+        let value = Vec3::new(value[0], value[1], value[2]);
+        let normal = value * F::splat(2.0) - Vec3::splat(1.0);
+        (normal, Vec3::all(glam::Vec3::X))
     }
 }

@@ -2,21 +2,22 @@
 //! shadowing that hides the edge where the surface itself turns away from the light (Estevez, Lecocq and
 //! Stein, *A microfacet-based shadowing function to solve the bump terminator problem*, 2019).
 
-use glam::{Vec2, Vec3};
-
-use super::{Bsdf, BsdfSample, BsdfValue, Lobes, Material, PhongTerms, nested};
+use super::{
+    BlockBsdf, Bsdf, BsdfSamples, BsdfValues, Lobes, Material, PhongTerms, nested, single_face,
+};
 use crate::color::ColorModel;
 use crate::description::declared::{Row, boolean, nested as nested_row};
 use crate::description::{Kind, Properties};
 use crate::error::Result;
-use crate::interaction::Interaction;
-use crate::math::Frame;
+use crate::interaction::{Interaction, Points};
+use crate::lanes::{Frame, Lanes, Vec2, Vec3};
 use crate::texture::Palettes;
 
 /// Where the normals of a surface point.
 pub trait Normals: std::fmt::Debug + Send + Sync {
-    /// The normal, of any length, and the direction that the frame's s follows; both in the shading frame.
-    fn normal(&self, at: &Interaction<'_>) -> (Vec3, Vec3);
+    /// The normals, of any length, and the directions that the frames' s follow; both in the shading frame. Must be
+    /// `#[inline(always)]`.
+    fn normals<F: Lanes>(&self, at: &Points<'_, F>) -> (Vec3<F>, Vec3<F>);
 }
 
 /// A material on a surface with other normals than its own.
@@ -58,29 +59,59 @@ impl<C: ColorModel, N: Normals> Perturbed<C, N> {
         })
     }
 
-    /// The frame around the normal, in coordinates of the surface's shading frame: the normal is turned about z
-    /// where it would face away from `wi`.
-    fn frame(&self, at: &Interaction<'_>, wi: Vec3) -> Frame {
-        let (n, tangent) = self.normals.normal(at);
-        let away = wi.z * wi.dot(n) <= 0.0;
-        let n = if away && self.flip_invalid_normals {
-            Vec3::new(-n.x, -n.y, n.z)
-        } else {
-            n
-        };
-        let n = n.try_normalize().unwrap_or(Vec3::Z);
-        Frame::along(n, tangent)
+    /// The frames around the normals, in coordinates of the surface's shading frames: normals are turned about z where
+    /// they would face away from `wi`.
+    #[inline(always)]
+    fn frames<F: Lanes>(&self, at: &Points<'_, F>, wi: Vec3<F>) -> Frame<F> {
+        let (mut n, tangent) = self.normals.normals(at);
+        if self.flip_invalid_normals {
+            let away = (wi.z * wi.dot(n)).le(F::zero());
+            n = Vec3::select(away, Vec3::new(-n.x, -n.y, n.z), n);
+        }
+        Frame::along(unit_or_up(n), tangent)
     }
 
     /// The share of light from `wo` that the bumps let through.
-    fn shadowing(&self, frame: &Frame, wo: Vec3) -> f32 {
+    #[inline(always)]
+    fn shadowing<F: Lanes>(&self, frames: &Frame<F>, wo: Vec3<F>) -> F {
+        let one = F::one();
         if !self.use_shadowing_function {
-            return 1.0;
+            return one;
         }
-        let tan2 = |v: Vec3| (1.0 - v.z * v.z).max(0.0) / (v.z * v.z);
-        let alpha2 = (0.125 * tan2(frame.n)).min(1.0);
-        2.0 / (1.0 + (1.0 + alpha2 * tan2(wo)).sqrt())
+        let alpha2 = (F::splat(0.125) * tan2(frames.n)).min(one);
+        F::splat(2.0) / (one + (one + alpha2 * tan2(wo)).sqrt())
     }
+}
+
+/// Of length 1; +z where that cannot be.
+#[inline(always)]
+pub(super) fn unit_or_up<F: Lanes>(v: Vec3<F>) -> Vec3<F> {
+    let unit = v.normalize_or_zero();
+    let none = unit.length_squared().eq(F::zero());
+    Vec3::select(none, Vec3::all(glam::Vec3::Z), unit)
+}
+
+/// The square of the tangent of a unit vector's angle with z.
+#[inline(always)]
+fn tan2<F: Lanes>(v: Vec3<F>) -> F {
+    let cos2 = v.z * v.z;
+    (F::one() - cos2).max(F::zero()) / cos2
+}
+
+/// The surface with its shading frames turned to `frames`, in coordinates of its own, and `wi` in those.
+#[inline(always)]
+fn turned<'a, F: Lanes>(
+    at: &Points<'a, F>,
+    frames: &Frame<F>,
+    wi: Vec3<F>,
+) -> (Points<'a, F>, Vec3<F>) {
+    let wi = frames.to_local(wi);
+    let frame = Frame {
+        s: at.frame.to_world(frames.s),
+        t: at.frame.to_world(frames.t),
+        n: at.frame.to_world(frames.n),
+    };
+    (Points { frame, wi, ..*at }, wi)
 }
 
 impl<C: ColorModel, N: Normals> Bsdf<C> for Perturbed<C, N> {
@@ -88,84 +119,73 @@ impl<C: ColorModel, N: Normals> Bsdf<C> for Perturbed<C, N> {
         self.nested.lobes()
     }
 
-    fn eval(
-        &self,
-        at: &Interaction<'_>,
-        wi: Vec3,
-        wo: Vec3,
-        w: &C::Wavelengths,
-    ) -> Option<BsdfValue<C::Sample>> {
-        let frame = self.frame(at, wi);
-        let turned = frame.to_local(wo);
-        if turned.z * wo.z <= 0.0 {
-            return None;
-        }
-        let (inner, wi) = turned_interaction(at, &frame, wi);
-        let value = self.nested.eval(&inner, wi, turned, w)?;
-        Some(BsdfValue {
-            value: value.value * self.shadowing(&frame, wo),
-            pdf: value.pdf,
-        })
-    }
-
-    fn sample(
-        &self,
-        at: &Interaction<'_>,
-        wi: Vec3,
-        u1: f32,
-        u2: Vec2,
-        w: &C::Wavelengths,
-    ) -> Option<BsdfSample<C::Sample>> {
-        let frame = self.frame(at, wi);
-        let (inner, wi) = turned_interaction(at, &frame, wi);
-        let sample = self.nested.sample(&inner, wi, u1, u2, w)?;
-        let wo = frame.to_world(sample.wo);
-        (sample.wo.z * wo.z > 0.0).then(|| BsdfSample {
-            wo,
-            weight: sample.weight * self.shadowing(&frame, wo),
-            ..sample
-        })
-    }
+    single_face!();
 
     /// The terms about the turned normal; the textbook knows no shadowing of bumps.
     fn phong(
         &self,
         at: &Interaction<'_>,
-        wi: Vec3,
-        wo: Vec3,
+        wi: glam::Vec3,
+        wo: glam::Vec3,
         w: &C::Wavelengths,
     ) -> Option<PhongTerms<C::Sample>> {
-        let frame = self.frame(at, wi);
-        let turned = frame.to_local(wo);
-        if turned.z * wo.z <= 0.0 {
+        let point = Points::one(at);
+        let frame = self.frames(&point, wi.into());
+        let inner_wo = frame.to_local(wo.into());
+        if inner_wo.z * wo.z <= 0.0 {
             return None;
         }
-        let (inner, wi) = turned_interaction(at, &frame, wi);
-        self.nested.phong(&inner, wi, turned, w)
+        let (inner, inner_wi) = turned(&point, &frame, wi.into());
+        let (wi, wo) = (inner_wi.into(), inner_wo.into());
+        self.nested.phong(&inner.lane(0), wi, wo, w)
     }
 
-    fn ambient(&self, at: &Interaction<'_>, wi: Vec3, w: &C::Wavelengths) -> C::Sample {
-        let (inner, wi) = turned_interaction(at, &self.frame(at, wi), wi);
-        self.nested.ambient(&inner, wi, w)
+    fn ambient(&self, at: &Interaction<'_>, wi: glam::Vec3, w: &C::Wavelengths) -> C::Sample {
+        let point = Points::one(at);
+        let frame = self.frames(&point, wi.into());
+        let (inner, wi) = turned(&point, &frame, wi.into());
+        self.nested.ambient(&inner.lane(0), wi.into(), w)
     }
 }
 
-/// The surface with its shading frame turned to `frame`, and `wi` in that frame.
-fn turned_interaction<'s>(
-    at: &Interaction<'s>,
-    frame: &Frame,
-    wi: Vec3,
-) -> (Interaction<'s>, Vec3) {
-    let world = Frame {
-        s: at.frame.to_world(frame.s),
-        t: at.frame.to_world(frame.t),
-        n: at.frame.to_world(frame.n),
-    };
-    let wi = frame.to_local(wi);
-    let inner = Interaction {
-        frame: world,
-        wi,
-        ..at.clone()
-    };
-    (inner, wi)
+impl<C: ColorModel, N: Normals> BlockBsdf<C> for Perturbed<C, N> {
+    #[inline(always)]
+    fn eval_lanes<F: Lanes>(
+        &self,
+        at: &Points<'_, F>,
+        wi: Vec3<F>,
+        wo: Vec3<F>,
+        w: &[C::Wavelengths],
+    ) -> BsdfValues<F, C::Columns<F>> {
+        let frames = self.frames(at, wi);
+        let (inner, inner_wi) = turned(at, &frames, wi);
+        let inner_wo = frames.to_local(wo);
+        let values = self.nested.eval_lanes(&inner, inner_wi, inner_wo, w);
+        let values = BsdfValues {
+            value: values.value * self.shadowing(&frames, wo),
+            ..values
+        };
+        values.only(F::zero().lt(inner_wo.z * wo.z))
+    }
+
+    #[inline(always)]
+    fn sample_lanes<F: Lanes>(
+        &self,
+        at: &Points<'_, F>,
+        wi: Vec3<F>,
+        u1: F,
+        u2: Vec2<F>,
+        w: &[C::Wavelengths],
+    ) -> BsdfSamples<F, C::Columns<F>> {
+        let frames = self.frames(at, wi);
+        let (inner, inner_wi) = turned(at, &frames, wi);
+        let samples = self.nested.sample_lanes(&inner, inner_wi, u1, u2, w);
+        let wo = frames.to_world(samples.wo);
+        BsdfSamples {
+            drawn: samples.drawn & F::zero().lt(samples.wo.z * wo.z),
+            wo,
+            weight: samples.weight * self.shadowing(&frames, wo),
+            ..samples
+        }
+    }
 }
