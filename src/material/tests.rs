@@ -5,10 +5,12 @@ use std::path::Path;
 use glam::{Vec2, Vec3};
 
 use super::*;
-use crate::color::Rgb;
+use crate::color::{Rgb, Samples, Spectra};
 use crate::description::{Description, Options};
-use crate::lanes::warp;
-use crate::math::random;
+use crate::interaction::{Points, Source};
+use crate::lanes::{self, Kernel, Lanes, Mask as _, Task, warp};
+use crate::math::{Frame, random};
+use crate::mesh::Mesh;
 
 /// Scene text of each material under test, a member of the family at least once.
 const MATERIALS: &[(&str, &str)] = &[
@@ -461,4 +463,219 @@ fn twosided_refuses_what_transmits() {
     let bsdf = &scene.root().children(Kind::Bsdf)[0];
     let error = Material::build(bsdf, &Palettes::new(Rgb)).unwrap_err();
     assert!(error.to_string().contains("transmits light"), "{error}");
+}
+
+/// Materials whose textures differ between the points of a block.
+const VARYING: &[(&str, &str)] = &[
+    (
+        "blendbsdf",
+        r#"<bsdf type="blendbsdf"><texture name="weight" type="zoneplate"/><bsdf type="null"/><bsdf type="mask"><texture name="opacity" type="checkerboard"/><bsdf type="roughplastic"/></bsdf></bsdf>"#,
+    ),
+    (
+        "bumpmap",
+        r#"<bsdf type="bumpmap"><float name="scale" value="0.2"/><texture type="zoneplate"/><bsdf type="roughdielectric"><texture name="alpha" type="zoneplate"/></bsdf></bsdf>"#,
+    ),
+    (
+        "normalmap",
+        r#"<bsdf type="normalmap"><boolean name="flip_invalid_normals" value="false"/><boolean name="use_shadowing_function" value="false"/><texture name="normalmap" type="checkerboard"/><bsdf type="plastic"/></bsdf>"#,
+    ),
+    (
+        "phong",
+        r#"<bsdf type="twosided"><bsdf type="phong"><texture name="exponent" type="zoneplate"><float name="color1" value="200"/></texture></bsdf></bsdf>"#,
+    ),
+    (
+        "principled",
+        r#"<bsdf type="principled"><rgb name="base_color" value="0.8, 0.9, 1"/><texture name="spec_trans" type="zoneplate"/><texture name="clearcoat" type="checkerboard"><float name="color0" value="0"/></texture><texture name="clearcoat_gloss" type="zoneplate"/><texture name="metallic" type="checkerboard"/><float name="specular" value="0.3"/></bsdf>"#,
+    ),
+    (
+        "principledthin",
+        r#"<bsdf type="principledthin"><texture name="base_color" type="checkerboard"><float name="color0" value="0"/></texture><texture name="spec_trans" type="zoneplate"/><texture name="eta" type="checkerboard"><float name="color0" value="1"/><float name="color1" value="1.7"/></texture><texture name="diff_trans" type="zoneplate"/></bsdf>"#,
+    ),
+];
+
+/// A point, and what a material is asked there.
+#[derive(Clone, Debug)]
+struct Question {
+    at: Interaction<'static>,
+    wo: Vec3,
+    u1: f32,
+    u2: Vec2,
+}
+
+impl Question {
+    /// The `i`-th; some are at the edges.
+    fn new(i: u32) -> Self {
+        let of = |k: u32| uniforms(k * 100_000 + i);
+        let direction = |k| Vec3::from(warp::uniform_sphere(of(k).1.into()));
+        let (u1, u2) = of(0);
+        let wi = match i % 19 {
+            0 => Vec3::Z,
+            1 => Vec3::X,
+            _ => direction(1),
+        };
+        let normal = Vec3::from(warp::cosine_hemisphere(of(2).1.into()));
+        let shading = (normal + 0.5 * direction(3)).normalize();
+        let dp_du = 3.0 * direction(4);
+        let (time, uv) = of(5);
+        Self {
+            at: Interaction {
+                position: 10.0 * direction(6),
+                normal,
+                frame: Frame::along(shading, dp_du),
+                dp_du,
+                dp_dv: 2.0 * direction(7),
+                wi,
+                time,
+                ..Interaction::at_uv(3.0 * uv)
+            },
+            wo: if i % 19 == 2 { -wi } else { direction(8) },
+            u1: if i % 19 == 3 { 0.0 } else { u1 },
+            u2,
+        }
+    }
+}
+
+/// A value, and a direction drawn.
+type Answer = (
+    Option<BsdfValue<Samples<3>>>,
+    Option<BsdfSample<Samples<3>>>,
+);
+
+/// What a material says one by one.
+fn answer(material: &Material<Rgb>, question: &Question) -> Answer {
+    let Question { at, wo, u1, u2 } = question;
+    (
+        material.eval(at, at.wi, *wo, &()),
+        material.sample(at, at.wi, *u1, *u2, &()),
+    )
+}
+
+/// The bits of an answer.
+fn bits((value, sample): &Answer) -> Vec<Option<u32>> {
+    let mut bits = Vec::new();
+    let mut push = |numbers: &[f32]| bits.extend(numbers.iter().map(|x| Some(x.to_bits())));
+    if let Some(BsdfValue { value, pdf }) = value {
+        push(&[value[0], value[1], value[2], *pdf]);
+    }
+    if let Some(s) = sample {
+        push(&s.wo.to_array());
+        push(&[s.weight[0], s.weight[1], s.weight[2], s.pdf, s.eta]);
+        push(&[s.delta, s.null].map(|flag| f32::from(u8::from(flag))));
+    }
+    bits.extend([value.is_none(), sample.is_none()].map(|none| none.then_some(0)));
+    bits
+}
+
+/// A block of questions.
+struct Block<'a>(&'a [Question]);
+
+impl Source for Block<'_> {
+    fn interaction(&self, lane: usize) -> Interaction<'_> {
+        self.0[lane].at.clone()
+    }
+
+    fn on_mesh(&self, _lane: usize) -> Option<(&Mesh, u32, Vec2)> {
+        None
+    }
+}
+
+impl Block<'_> {
+    fn numbers<F: Lanes>(&self, of: impl Fn(&Question) -> f32) -> F {
+        F::from_fn(|lane| of(&self.0[lane]))
+    }
+
+    fn vectors<F: Lanes>(&self, of: impl Fn(&Question) -> Vec3) -> lanes::Vec3<F> {
+        lanes::Vec3::new(
+            self.numbers(|question| of(question).x),
+            self.numbers(|question| of(question).y),
+            self.numbers(|question| of(question).z),
+        )
+    }
+
+    fn points<F: Lanes>(&self) -> Points<'_, F> {
+        Points {
+            active: F::Mask::from_bits(!(u32::MAX << F::WIDTH)),
+            position: self.vectors(|q| q.at.position),
+            error: self.vectors(|q| q.at.error),
+            normal: self.vectors(|q| q.at.normal),
+            frame: lanes::Frame {
+                s: self.vectors(|q| q.at.frame.s),
+                t: self.vectors(|q| q.at.frame.t),
+                n: self.vectors(|q| q.at.frame.n),
+            },
+            uv: self.vectors(|q| q.at.uv.extend(0.0)).xy(),
+            dp_du: self.vectors(|q| q.at.dp_du),
+            dp_dv: self.vectors(|q| q.at.dp_dv),
+            wi: self.vectors(|q| q.at.wi),
+            source: self,
+        }
+    }
+}
+
+/// Asks a material block by block.
+struct Ask<'a> {
+    material: &'a Material<Rgb>,
+    questions: &'a [Question],
+}
+
+impl Task for Ask<'_> {
+    type Output = Vec<Answer>;
+
+    #[inline(always)]
+    fn run<F: Lanes>(self) -> Vec<Answer> {
+        let mut answers = Vec::new();
+        for questions in self.questions.chunks_exact(F::WIDTH) {
+            let block = Block(questions);
+            let at = block.points::<F>();
+            let wo = block.vectors(|q| q.wo);
+            let u1 = block.numbers(|q| q.u1);
+            let u2 = block.vectors(|q| q.u2.extend(0.0)).xy();
+            let w = &[(); lanes::MAX_LANES];
+            let values = self.material.eval_lanes(&at, at.wi, wo, w);
+            let samples = self.material.sample_lanes(&at, at.wi, u1, u2, w);
+            let of = |mask: F::Mask, lane: usize| mask.to_bits() >> lane & 1 == 1;
+            answers.extend((0..F::WIDTH).map(|lane| {
+                let value: Samples<3> = values.value.sample(lane);
+                let pdf = values.pdf.lane(lane);
+                let value = BsdfValue { value, pdf };
+                let sample = BsdfSample {
+                    wo: samples.wo.lane(lane),
+                    weight: samples.weight.sample(lane),
+                    pdf: samples.pdf.lane(lane),
+                    eta: samples.eta.lane(lane),
+                    delta: of(samples.delta, lane),
+                    null: of(samples.null, lane),
+                };
+                let there = pdf > 0.0 || !value.value.is_black();
+                let drawn = of(samples.drawn, lane);
+                (there.then_some(value), drawn.then_some(sample))
+            }));
+        }
+        answers
+    }
+}
+
+#[test]
+fn a_block_is_told_what_its_points_are_told_one_by_one() {
+    let questions: Vec<Question> = (0..640).map(Question::new).collect();
+    for (name, text) in MATERIALS.iter().chain(VARYING) {
+        let material = build(text);
+        let expected = questions.iter().map(|q| answer(&material, q));
+        let expected: Vec<Answer> = expected.collect();
+        for kernel in Kernel::all() {
+            let found = kernel.run(Ask {
+                material: &material,
+                questions: &questions,
+            });
+            assert_eq!(found.len(), expected.len());
+            for (i, (found, expected)) in found.iter().zip(&expected).enumerate() {
+                assert!(
+                    bits(found) == bits(expected),
+                    "{name}, {}, {:?}: {found:?} {expected:?}",
+                    kernel.name(),
+                    questions[i]
+                );
+            }
+        }
+    }
 }
