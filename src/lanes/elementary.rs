@@ -51,7 +51,7 @@ pub fn exp<F: Lanes>(x: F) -> F {
 #[inline(always)]
 pub fn ln<F: Lanes>(x: F) -> F {
     const FIT: [f32; 9] = [
-        3.333_333_1e-1,
+        3.333_333e-1,
         -2.499_999_4e-1,
         2.000_071_5e-1,
         -1.666_805_8e-1,

@@ -1,12 +1,14 @@
 //! One lane: plain numbers, on every processor.
 
+use std::num::Wrapping;
+
 use super::{Call, Doubles, Ints, Lanes, Mask};
 
 impl Lanes for f32 {
     const WIDTH: usize = 1;
     const ROW: [f32; 1] = [0.0; 1];
     type Row = [f32; 1];
-    type Int = u32;
+    type Int = Wrapping<u32>;
     type Mask = bool;
     type Double = f64;
 
@@ -75,12 +77,12 @@ impl Lanes for f32 {
     }
 
     #[inline(always)]
-    fn to_bits(self) -> u32 {
-        f32::to_bits(self)
+    fn to_bits(self) -> Wrapping<u32> {
+        Wrapping(f32::to_bits(self))
     }
     #[inline(always)]
-    fn to_int(self) -> u32 {
-        self as i32 as u32
+    fn to_int(self) -> Wrapping<u32> {
+        Wrapping((self as i32).cast_unsigned())
     }
     #[inline(always)]
     fn widen(self) -> f64 {
@@ -88,30 +90,30 @@ impl Lanes for f32 {
     }
 }
 
-impl Ints for u32 {
-    type Row = [u32; 1];
+impl Ints for Wrapping<u32> {
     type Float = f32;
     type Mask = bool;
+    type Row = [u32; 1];
 
     #[inline(always)]
     fn splat(value: u32) -> Self {
-        value
+        Self(value)
     }
     #[inline(always)]
     fn load(row: &[u32; 1]) -> Self {
-        row[0]
+        Self(row[0])
     }
     #[inline(always)]
     fn store(self, row: &mut [u32; 1]) {
-        row[0] = self;
+        row[0] = self.0;
     }
     #[inline(always)]
     fn shl<const N: u32>(self) -> Self {
-        self << N
+        Self(self.0 << N)
     }
     #[inline(always)]
     fn shr<const N: u32>(self) -> Self {
-        self >> N
+        Self(self.0 >> N)
     }
     #[inline(always)]
     fn eq(self, other: Self) -> bool {
@@ -119,15 +121,15 @@ impl Ints for u32 {
     }
     #[inline(always)]
     fn lt(self, other: Self) -> bool {
-        self.cast_signed() < other.cast_signed()
+        self.0.cast_signed() < other.0.cast_signed()
     }
     #[inline(always)]
     fn to_float(self) -> f32 {
-        self.cast_signed() as f32
+        self.0.cast_signed() as f32
     }
     #[inline(always)]
     fn from_bits(self) -> f32 {
-        f32::from_bits(self)
+        f32::from_bits(self.0)
     }
 }
 

@@ -64,14 +64,23 @@ fn axes_of(way: usize) -> [usize; 3] {
     AXES[way / 2][way % 2]
 }
 
+/// A point along these axes, for all rays.
+#[inline(always)]
+fn along<F: Lanes>(point: glam::Vec3, [x, y, z]: [usize; 3]) -> Vec3<F> {
+    Vec3::new(F::splat(point[x]), F::splat(point[y]), F::splat(point[z]))
+}
+
 impl<F: Lanes> Packet<F> {
     #[inline(always)]
     fn new(origin: Vec3<F>, direction: Vec3<F>) -> Self {
         let (zero, one) = (F::zero(), F::one());
         let smallest = F::splat(SMALLEST);
         let (x, y, z) = (direction.x, direction.y, direction.z);
-        let bounded = |d: F| F::select(d.abs().lt(smallest), smallest.copysign(d), d);
-        let inverse = Vec3::new(one / bounded(x), one / bounded(y), one / bounded(z));
+        let inverse = Vec3::new(
+            one / F::select(x.abs().lt(smallest), smallest.copysign(x), x),
+            one / F::select(y.abs().lt(smallest), smallest.copysign(y), y),
+            one / F::select(z.abs().lt(smallest), smallest.copysign(z), z),
+        );
         let middle = -origin.times(inverse);
         let lost = middle.abs() * F::splat(LOST);
         let (a, b, c) = (x.abs(), y.abs(), z.abs());
@@ -351,26 +360,10 @@ impl<'t, W: Walker<'t>, const ANY: bool> Packets<'_, 't, W, ANY> {
             if !mask.any() {
                 continue;
             }
-            let [x, y, z] = axes_of(way);
-            let corners = &block.corners;
+            let axes = axes_of(way);
             for lane in 0..count as usize {
-                let sheared = [
-                    Vec3::new(
-                        F::splat(corners[x][0][lane]),
-                        F::splat(corners[y][0][lane]),
-                        F::splat(corners[z][0][lane]),
-                    ),
-                    Vec3::new(
-                        F::splat(corners[x][1][lane]),
-                        F::splat(corners[y][1][lane]),
-                        F::splat(corners[z][1][lane]),
-                    ),
-                    Vec3::new(
-                        F::splat(corners[x][2][lane]),
-                        F::splat(corners[y][2][lane]),
-                        F::splat(corners[z][2][lane]),
-                    ),
-                ];
+                let [a, b, c] = block.triangle(lane);
+                let sheared = [along(a, axes), along(b, axes), along(c, axes)];
                 let [u, v, w] = packet.edges(sheared);
                 let up = u.ge(zero) & v.ge(zero) & w.ge(zero);
                 let down = u.le(zero) & v.le(zero) & w.le(zero);
@@ -378,7 +371,6 @@ impl<'t, W: Walker<'t>, const ANY: bool> Packets<'_, 't, W, ANY> {
                 if !inside.any() {
                     continue;
                 }
-                let [a, b, c] = block.triangle(lane);
                 let (low, high) = (a.min(b).min(c), a.max(b).max(c));
                 let slabs = [low.x, high.x, low.y, high.y, low.z, high.z];
                 let [own, far] = packet.enter(slabs);
