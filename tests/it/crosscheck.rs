@@ -332,6 +332,7 @@ esac
         place.python(&format!(
             "echo $$ >pid; read order; {LOADED}; exec sleep 60"
         ));
+        crate::support::let_children_hear_interrupts();
         let mut child = Command::new(env!("CARGO_BIN_EXE_etendue"))
             .current_dir(place.0.path())
             .args([

@@ -118,6 +118,7 @@ fn a_render_that_is_killed_at_ten_random_moments_ends_with_the_same_bits() {
 #[cfg(unix)]
 #[test]
 fn each_signal_leaves_a_valid_image_and_a_second_start_finishes_it() {
+    crate::support::let_children_hear_interrupts();
     let place = Place::new();
     let whole = place.run(&["-o", "whole.exr", "-q", "--spp", "200"]);
     assert!(whole.status.success());
