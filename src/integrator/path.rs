@@ -15,7 +15,7 @@ use crate::description::Properties;
 use crate::description::declared::Plugin;
 use crate::error::Result;
 use crate::interaction::{Hit, Points, Ray};
-use crate::lanes::{Lanes, MAX_LANES, Mask as _, Task};
+use crate::lanes::{Lanes, MAX_LANES, Mask as _, Task, Vec3};
 use crate::material::Material;
 use crate::sampler::{Sampler, Stream};
 use crate::scene::Scene;
@@ -313,8 +313,8 @@ impl<C: ColorModel> Scatter<'_, C> {
         for lane in lit.lanes() {
             let index = block.indices[lane] as usize;
             let ray = Ray {
-                origin: glam::Vec3::from_array(origins.map(|row| row[lane])),
-                direction: glam::Vec3::from_array(directions.map(|row| row[lane])),
+                origin: Vec3::<F>::of(&origins, lane),
+                direction: Vec3::<F>::of(&directions, lane),
                 t_max: ends[lane],
                 time: self.walkers.rays[index].time,
             };
@@ -361,16 +361,14 @@ impl<C: ColorModel> Scatter<'_, C> {
         let delta = sample.delta.to_bits();
         for lane in lives.lanes() {
             let index = block.indices[lane] as usize;
-            let vector =
-                |rows: &[F::Row; 3]| glam::Vec3::new(rows[0][lane], rows[1][lane], rows[2][lane]);
             let scattered = (delta >> lane & 1 == 0).then(|| Scattered {
-                from: vector(&places),
+                from: Vec3::<F>::of(&places, lane),
                 pdf: pdfs[lane],
                 light_share: 1.0,
             });
             let ray = Ray {
-                origin: vector(&origins),
-                direction: vector(&directions),
+                origin: Vec3::<F>::of(&origins, lane),
+                direction: Vec3::<F>::of(&directions, lane),
                 t_max: f32::INFINITY,
                 time: self.walkers.rays[index].time,
             };

@@ -1,6 +1,6 @@
 //! Points on surfaces in lanes: what a block of paths has met.
 
-use super::{Interaction, Ray, SHADOW_EPSILON, offset};
+use super::{Interaction, SHADOW_EPSILON, offset};
 use crate::lanes::{Frame, Lanes, Mask as _, Vec2, Vec3};
 use crate::mesh::Mesh;
 
@@ -142,17 +142,4 @@ pub struct ShadowRays<F> {
     pub direction: Vec3<F>,
     /// Where they end.
     pub t_max: F,
-}
-
-impl<F: Lanes> ShadowRays<F> {
-    /// One lane's ray.
-    #[inline(always)]
-    pub fn lane(&self, lane: usize, time: f32) -> Ray {
-        Ray {
-            origin: self.origin.lane(lane),
-            direction: self.direction.lane(lane),
-            t_max: self.t_max.lane(lane),
-            time,
-        }
-    }
 }

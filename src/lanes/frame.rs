@@ -63,6 +63,17 @@ impl<F: Lanes> Frame<F> {
     }
 }
 
+impl From<Frame<f32>> for math::Frame {
+    #[inline(always)]
+    fn from(frame: Frame<f32>) -> Self {
+        Self {
+            s: frame.s.into(),
+            t: frame.t.into(),
+            n: frame.n.into(),
+        }
+    }
+}
+
 impl From<math::Frame> for Frame<f32> {
     #[inline(always)]
     fn from(frame: math::Frame) -> Self {

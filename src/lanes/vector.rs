@@ -58,6 +58,13 @@ macro_rules! componentwise {
                 Self { $($c: F::load($c)),+ }
             }
 
+            /// One lane's vector, of a row a component.
+            #[inline(always)]
+            pub fn of(rows: &[F::Row; $n], lane: usize) -> glam::$vector {
+                let [$($c),+] = rows;
+                glam::$vector::new($($c[lane]),+)
+            }
+
             /// A row a component.
             #[inline(always)]
             pub fn rows(self) -> [F::Row; $n] {

@@ -7,10 +7,10 @@ use std::sync::OnceLock;
 
 use glam::{DMat4, Vec2, Vec3};
 
-use super::quad::{Place, Quad};
+use super::quad::{Place, Quad, Seen};
 use super::{
     Bounds, Chart, Geometry, Setting, Shape, Surface, SurfaceSample, SurfaceSamples,
-    area_to_solid_angle, to_world,
+    area_to_solid_angle, area_to_solid_angles, to_world,
 };
 use crate::description::Properties;
 use crate::error::Result;
@@ -195,6 +195,13 @@ impl TriangleMesh {
         sample
     }
 
+    /// The rectangle that it is, where it is drawn evenly over the solid angle that a point sees.
+    fn evenly_seen(&self, from: Vec3) -> Option<(&Quad, Seen<f32>)> {
+        let quad = self.quad.as_ref()?;
+        let seen = quad.seen::<f32>(from.into());
+        seen.is_even.then_some((quad, seen))
+    }
+
     /// The shading normals at points of a rectangle.
     #[inline(always)]
     fn quad_normals<F: Lanes>(&self, fractions: lanes::Vec2<F>, active: F::Mask) -> lanes::Vec3<F> {
@@ -229,11 +236,8 @@ impl TriangleMesh {
         }
         let surface = triangles.surface();
         let area = areas.map_or(0.0, Discrete::total);
-        let way = surface.position - from;
-        let squared = way.length_squared();
-        let cosine = surface.normal.dot(way).abs() / squared.sqrt();
-        let pdf = squared / (cosine * F::splat(area as f32));
-        let drawn = active & cosine.gt(F::zero()) & pdf.is_finite();
+        let pdf = area_to_solid_angles(area, from, surface.position, surface.normal);
+        let drawn = active & F::zero().lt(pdf) & pdf.is_finite();
         SurfaceSamples {
             position: surface.position,
             normal: surface.frame.n,
@@ -264,11 +268,7 @@ impl Surface for TriangleMesh {
         let mut triangles = Triangles::<f32>::default();
         triangles.set(0, self, hit.primitive, Vec2::new(hit.u, hit.v));
         let surface = triangles.surface();
-        let frame = Frame {
-            s: surface.frame.s.into(),
-            t: surface.frame.t.into(),
-            n: surface.frame.n.into(),
-        };
+        let frame = Frame::from(surface.frame);
         Interaction {
             t: hit.t,
             position: surface.position.into(),
@@ -292,14 +292,11 @@ impl Surface for TriangleMesh {
     }
 
     fn sample(&self, from: Vec3, u: Vec2) -> Option<SurfaceSample> {
-        if let Some(quad) = &self.quad {
-            let seen = quad.seen::<f32>(from.into());
-            if seen.is_even {
-                return Some(SurfaceSample {
-                    pdf: 1.0 / seen.solid_angle,
-                    ..self.at(quad.place(seen.sample(u.into()).into()))
-                });
-            }
+        if let Some((quad, seen)) = self.evenly_seen(from) {
+            return Some(SurfaceSample {
+                pdf: 1.0 / seen.solid_angle,
+                ..self.at(quad.place(seen.sample(u.into()).into()))
+            });
         }
         let areas = self.areas()?;
         let drawn = areas.sample(u.x);
@@ -316,13 +313,10 @@ impl Surface for TriangleMesh {
     }
 
     fn pdf(&self, from: Vec3, at: &Interaction<'_>) -> f32 {
-        if let Some(quad) = &self.quad {
-            let seen = quad.seen::<f32>(from.into());
-            if seen.is_even {
-                return 1.0 / seen.solid_angle;
-            }
+        match self.evenly_seen(from) {
+            Some((_, seen)) => 1.0 / seen.solid_angle,
+            None => area_to_solid_angle(self.area(), from, at.position, at.normal),
         }
-        area_to_solid_angle(self.area(), from, at.position, at.normal)
     }
 
     fn chart(&self, parameters: Vec2) -> Option<Chart> {

@@ -537,5 +537,19 @@ pub fn area_to_solid_angle(area: f64, from: Vec3, position: Vec3, normal: Vec3) 
     }
 }
 
+/// The same in lanes and single precision; what is no density, seen on edge, is infinite or no number.
+#[inline(always)]
+fn area_to_solid_angles<F: Lanes>(
+    area: f64,
+    from: lanes::Vec3<F>,
+    position: lanes::Vec3<F>,
+    normal: lanes::Vec3<F>,
+) -> F {
+    let way = position - from;
+    let squared = way.length_squared();
+    let cosine = normal.dot(way).abs() / squared.sqrt();
+    squared / (cosine * F::splat(area as f32))
+}
+
 #[cfg(test)]
 mod tests;

@@ -10,7 +10,7 @@ use glam::{DMat4, DVec3, Mat3, Vec2, Vec3};
 
 use super::{
     Bounds, Chart, Geometry, Shape, Surface, SurfaceSample, SurfaceSamples, area_to_solid_angle,
-    to_world,
+    area_to_solid_angles, to_world,
 };
 use crate::description::Properties;
 use crate::description::declared::{Plugin, float, vector};
@@ -171,10 +171,8 @@ impl Sphere {
         if (active & !outside).any() {
             let other = warp::uniform_sphere(u);
             outward = lanes::Vec3::select(outside, outward, other);
-            let way = center + other * F::splat(self.radius) - from;
-            let squared = way.length_squared();
-            let cosine = other.dot(way).abs() / squared.sqrt();
-            let by_area = squared / (cosine * F::splat(self.area() as f32));
+            let position = center + other * F::splat(self.radius);
+            let by_area = area_to_solid_angles(self.area(), from, position, other);
             pdf = F::select(outside, pdf, by_area);
         }
         let drawn = active & zero.lt(pdf) & pdf.is_finite();
