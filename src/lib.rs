@@ -36,6 +36,8 @@ pub mod scene;
 
 pub mod integrator;
 
+pub(crate) mod film;
+
 pub mod render;
 
 pub mod crosscheck;

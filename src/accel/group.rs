@@ -48,7 +48,13 @@ pub(super) struct Shapes {
     shapes: Vec<Arc<Geometry>>,
     /// The number of each shape's first primitive.
     starts: Vec<u32>,
+    /// For runs of 2^`shift` numbers the shape of the first.
+    guide: Vec<u32>,
+    shift: u32,
 }
+
+/// Runs of the guide to a shape, about.
+const RUNS: usize = 4;
 
 impl Shapes {
     pub(super) fn new(shapes: Vec<Arc<Geometry>>) -> Self {
@@ -59,8 +65,20 @@ impl Shapes {
             next = after.expect("fewer than 2³² primitives fit into memory");
             start
         });
+        let starts: Vec<u32> = starts.collect();
+        let runs = (RUNS * shapes.len()).next_power_of_two() as u32;
+        let shift = (u32::BITS - next.leading_zeros()).saturating_sub(runs.ilog2());
+        let shape_of = |number: u32| starts.partition_point(|start| *start <= number) as u32 - 1;
+        let guide = match next.checked_sub(1) {
+            Some(last) => (0..=last >> shift)
+                .map(|run| shape_of(run << shift))
+                .collect(),
+            None => Vec::new(),
+        };
         Self {
-            starts: starts.collect(),
+            guide,
+            shift,
+            starts,
             shapes,
         }
     }
@@ -75,7 +93,14 @@ impl Shapes {
     #[inline]
     pub(super) fn numbered(&self, number: u32) -> Item {
         // The last shape that starts there or before; empty ones before it start there too.
-        let shape = self.starts.partition_point(|start| *start <= number) - 1;
+        let mut shape = self.guide[(number >> self.shift) as usize] as usize;
+        while self
+            .starts
+            .get(shape + 1)
+            .is_some_and(|start| *start <= number)
+        {
+            shape += 1;
+        }
         Item::primitive(shape as u32, number - self.starts[shape])
     }
 

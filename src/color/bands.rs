@@ -9,9 +9,10 @@ use super::cie;
 use super::d65::d65;
 use super::model::{Color, ColorModel, Role, xyz_to_rgb};
 use super::rgb::{check, curve};
-use super::samples::{Columns, Samples, Spectral};
+use super::samples::{Columns, Samples, Spectra as _, Spectral};
+use super::texels::Pixels;
 use super::upsample::{Sigmoid, Table, fit};
-use crate::lanes::{Kernel, Lanes, Task};
+use crate::lanes::{Ints as _, Kernel, Lanes, Task};
 
 /// Up to `N` bands in `N` lanes; lanes in excess carry nothing.
 #[derive(Clone, Copy, Debug)]
@@ -74,6 +75,28 @@ pub struct SpectralTexel {
     illuminant: bool,
 }
 
+impl SpectralTexel {
+    fn new(table: &Table, rgb: [f32; 3], role: Role) -> Self {
+        let (scale, rgb) = match role {
+            Role::Reflectance => (1.0, rgb.map(|v| v.clamp(0.0, 1.0))),
+            Role::Emission | Role::Quantity | Role::Tabulated => scaled(rgb),
+        };
+        Self {
+            scale,
+            sigmoid: table.lookup(rgb),
+            illuminant: role == Role::Emission,
+        }
+    }
+
+    #[inline]
+    fn evaluate<const N: usize>(&self, wavelengths: &[f32; N]) -> Samples<N> {
+        Samples(wavelengths.map(|l| {
+            let light = if self.illuminant { d65(l) } else { 1.0 };
+            self.scale * light * self.sigmoid.eval(l)
+        }))
+    }
+}
+
 /// Splits an RGB triple of any brightness into a scale and a reflectance, as Mitsuba does for light.
 fn scaled(rgb: [f32; 3]) -> (f32, [f32; 3]) {
     let scale = 2.0 * rgb[0].max(rgb[1]).max(rgb[2]);
@@ -86,7 +109,7 @@ fn scaled(rgb: [f32; 3]) -> (f32, [f32; 3]) {
 
 impl<const N: usize> ColorModel for Bands<N> {
     type Stored = Spectrum;
-    type Texel = SpectralTexel;
+    type Texels = Vec<SpectralTexel>;
     /// nm; 0 in the lanes that are not in use.
     type Wavelengths = [f32; N];
     type Sample = Samples<N>;
@@ -182,25 +205,29 @@ impl<const N: usize> ColorModel for Bands<N> {
         Samples(wavelengths.map(|l| stored.at(l)))
     }
 
-    fn texel(&self, rgb: [f32; 3], role: Role) -> SpectralTexel {
-        let (scale, rgb) = match role {
-            Role::Reflectance => (1.0, rgb.map(|v| v.clamp(0.0, 1.0))),
-            Role::Emission | Role::Quantity | Role::Tabulated => scaled(rgb),
-        };
-        let sigmoid = Table::shared().lookup(rgb);
-        SpectralTexel {
-            scale,
-            sigmoid,
-            illuminant: role == Role::Emission,
-        }
+    fn evaluate_rgb(&self, rgb: [f32; 3], role: Role, wavelengths: &[f32; N]) -> Samples<N> {
+        SpectralTexel::new(Table::shared(), rgb, role).evaluate(wavelengths)
     }
 
-    #[inline]
-    fn evaluate_texel(texel: &SpectralTexel, wavelengths: &[f32; N]) -> Samples<N> {
-        Samples(wavelengths.map(|l| {
-            let light = if texel.illuminant { d65(l) } else { 1.0 };
-            texel.scale * light * texel.sigmoid.eval(l)
-        }))
+    fn texels(&self, pixels: &Pixels, role: Role) -> Vec<SpectralTexel> {
+        let table = Table::shared();
+        let texel = |rgb| SpectralTexel::new(table, rgb, role);
+        pixels.iter().map(texel).collect()
+    }
+
+    #[inline(always)]
+    fn evaluate_texels<F: Lanes>(
+        texels: &Vec<SpectralTexel>,
+        index: F::Int,
+        wavelengths: &[[f32; N]],
+    ) -> Columns<F, N> {
+        let mut row = F::Int::ROW;
+        index.store(&mut row);
+        Columns::from_samples(|lane| {
+            let index = row[lane] as usize;
+            let texel = &texels[index.min(texels.len() - 1)];
+            texel.evaluate(&wavelengths[lane])
+        })
     }
 
     fn luminance(&self, sample: &Samples<N>, wavelengths: &[f32; N]) -> f32 {

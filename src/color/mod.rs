@@ -13,6 +13,7 @@ mod mono;
 mod primaries;
 mod rgb;
 mod samples;
+mod texels;
 
 pub use bands::Bands;
 pub use model::{Color, ColorModel, Role, luminance, rgb_to_xyz, xyz_to_rgb};
@@ -20,3 +21,4 @@ pub use mono::Mono;
 pub use primaries::Primaries;
 pub use rgb::Rgb;
 pub use samples::{Columns, Samples, Spectra, Spectral};
+pub use texels::{Packed, Pixels};

@@ -3,6 +3,7 @@
 //! once while it is built, and a path evaluates them at its own wavelengths.
 
 use super::samples::{Spectra, Spectral};
+use super::texels::Pixels;
 use crate::lanes::{Kernel, Lanes, Task};
 
 /// A colour as a scene file gives it.
@@ -48,8 +49,8 @@ impl Role {
 pub trait ColorModel: Clone + std::fmt::Debug + Send + Sync + 'static {
     /// A colour, ready to be evaluated at any wavelength.
     type Stored: Clone + std::fmt::Debug + Send + Sync;
-    /// A texel's colour, ready to be evaluated: small, for there are millions.
-    type Texel: Copy + std::fmt::Debug + Send + Sync;
+    /// An image's colours, ready to be evaluated: small, for there are millions.
+    type Texels: Clone + std::fmt::Debug + Send + Sync;
     /// The wavelengths that one path carries.
     type Wavelengths: Copy + std::fmt::Debug + Send + Sync;
     /// One value for each of them.
@@ -85,10 +86,21 @@ pub trait ColorModel: Clone + std::fmt::Debug + Send + Sync + 'static {
     ) -> Self::Columns<F> {
         Spectra::from_samples(|lane| Self::evaluate(stored, &wavelengths[lane]))
     }
-    /// A texel of linear BT.709 in its stored form; reflectances are clamped to [0, 1].
-    fn texel(&self, rgb: [f32; 3], role: Role) -> Self::Texel;
-    /// A texel at a path's wavelengths.
-    fn evaluate_texel(texel: &Self::Texel, wavelengths: &Self::Wavelengths) -> Self::Sample;
+    /// A colour of linear BT.709 at a path's wavelengths; reflectances are clamped to [0, 1].
+    fn evaluate_rgb(
+        &self,
+        rgb: [f32; 3],
+        role: Role,
+        wavelengths: &Self::Wavelengths,
+    ) -> Self::Sample;
+    /// An image's texels in their stored form; reflectances are clamped to [0, 1].
+    fn texels(&self, pixels: &Pixels, role: Role) -> Self::Texels;
+    /// Texels, one a lane, at their paths' wavelengths; what is beyond the last is that.
+    fn evaluate_texels<F: Lanes>(
+        texels: &Self::Texels,
+        index: F::Int,
+        wavelengths: &[Self::Wavelengths],
+    ) -> Self::Columns<F>;
 
     /// The luminance of a reflectance: 1 for white.
     fn luminance(&self, sample: &Self::Sample, wavelengths: &Self::Wavelengths) -> f32;

@@ -4,6 +4,7 @@
 use super::model::{Color, ColorModel, Role, luminance};
 use super::rgb::{Rgb, check};
 use super::samples::{Columns, Samples};
+use super::texels::Pixels;
 use crate::lanes::{Kernel, Lanes, Task};
 
 /// The model of plain numbers; a colour counts as its luminance.
@@ -12,7 +13,7 @@ pub struct Mono;
 
 impl ColorModel for Mono {
     type Stored = f32;
-    type Texel = f32;
+    type Texels = Vec<f32>;
     type Wavelengths = ();
     type Sample = Samples<1>;
     type Columns<F: Lanes> = Columns<F, 1>;
@@ -50,17 +51,22 @@ impl ColorModel for Mono {
         Columns([F::splat(*stored)])
     }
 
-    fn texel(&self, rgb: [f32; 3], role: Role) -> f32 {
+    fn evaluate_rgb(&self, rgb: [f32; 3], role: Role, _wavelengths: &()) -> Samples<1> {
         let value = luminance(rgb);
-        if role == Role::Reflectance {
-            value.clamp(0.0, 1.0)
-        } else {
-            value
-        }
+        Samples([match role {
+            Role::Reflectance => value.clamp(0.0, 1.0),
+            _ => value,
+        }])
     }
 
-    fn evaluate_texel(texel: &f32, _wavelengths: &()) -> Samples<1> {
-        Samples([*texel])
+    fn texels(&self, pixels: &Pixels, role: Role) -> Vec<f32> {
+        let value = |rgb| self.evaluate_rgb(rgb, role, &())[0];
+        pixels.iter().map(value).collect()
+    }
+
+    #[inline(always)]
+    fn evaluate_texels<F: Lanes>(texels: &Vec<f32>, index: F::Int, _: &[()]) -> Columns<F, 1> {
+        Columns([F::gather(texels, index)])
     }
 
     fn luminance(&self, sample: &Samples<1>, _wavelengths: &()) -> f32 {

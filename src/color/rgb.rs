@@ -5,6 +5,7 @@ use super::cie;
 use super::d65::d65;
 use super::model::{Color, ColorModel, Role, luminance, xyz_to_rgb};
 use super::samples::{Columns, Samples};
+use super::texels::{Packed, Pixels};
 use crate::lanes::{Kernel, Lanes, Task};
 
 /// The RGB colour model.
@@ -13,7 +14,7 @@ pub struct Rgb;
 
 impl ColorModel for Rgb {
     type Stored = [f32; 3];
-    type Texel = [f32; 3];
+    type Texels = Packed;
     type Wavelengths = ();
     type Sample = Samples<3>;
     type Columns<F: Lanes> = Columns<F, 3>;
@@ -73,17 +74,20 @@ impl ColorModel for Rgb {
         Columns([F::splat(r), F::splat(g), F::splat(b)])
     }
 
-    fn texel(&self, rgb: [f32; 3], role: Role) -> [f32; 3] {
-        if role == Role::Reflectance {
-            rgb.map(|v| v.clamp(0.0, 1.0))
-        } else {
-            rgb
-        }
+    fn evaluate_rgb(&self, rgb: [f32; 3], role: Role, _wavelengths: &()) -> Samples<3> {
+        Samples(match role {
+            Role::Reflectance => rgb.map(|v| v.clamp(0.0, 1.0)),
+            _ => rgb,
+        })
     }
 
-    #[inline]
-    fn evaluate_texel(texel: &[f32; 3], _wavelengths: &()) -> Samples<3> {
-        Samples(*texel)
+    fn texels(&self, pixels: &Pixels, role: Role) -> Packed {
+        Packed::new(pixels, |rgb| self.evaluate_rgb(rgb, role, &()).0)
+    }
+
+    #[inline(always)]
+    fn evaluate_texels<F: Lanes>(texels: &Packed, index: F::Int, _: &[()]) -> Columns<F, 3> {
+        Columns(texels.at(index))
     }
 
     fn luminance(&self, sample: &Samples<3>, _wavelengths: &()) -> f32 {

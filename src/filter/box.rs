@@ -4,6 +4,7 @@ use super::Kernel;
 use crate::description::Properties;
 use crate::description::declared::Plugin;
 use crate::error::Result;
+use crate::lanes::Lanes;
 
 /// Half a pixel to each side.
 #[derive(Clone, Debug)]
@@ -20,12 +21,15 @@ impl Box {
     }
 }
 
+impl Box {
+    #[inline(always)]
+    pub(super) fn weight<F: Lanes>(&self, x: F) -> F {
+        F::select(x.abs().le(F::splat(0.5)), F::one(), F::zero())
+    }
+}
+
 impl Kernel for Box {
     fn radius(&self) -> f32 {
         0.5
-    }
-
-    fn eval(&self, x: f32) -> f32 {
-        if x.abs() <= 0.5 { 1.0 } else { 0.0 }
     }
 }

@@ -4,6 +4,7 @@ use super::Kernel;
 use crate::description::Properties;
 use crate::description::declared::Plugin;
 use crate::error::Result;
+use crate::lanes::Lanes;
 
 /// A cubic of radius 2.
 #[derive(Clone, Debug)]
@@ -20,12 +21,15 @@ impl CatmullRom {
     }
 }
 
+impl CatmullRom {
+    #[inline(always)]
+    pub(super) fn weight<F: Lanes>(&self, x: F) -> F {
+        super::cubic(0.0, 0.5, x)
+    }
+}
+
 impl Kernel for CatmullRom {
     fn radius(&self) -> f32 {
         2.0
-    }
-
-    fn eval(&self, x: f32) -> f32 {
-        super::cubic(0.0, 0.5, x)
     }
 }

@@ -4,7 +4,8 @@ use super::Kernel;
 use crate::description::Properties;
 use crate::description::declared::{Plugin, float};
 use crate::error::Result;
-use crate::lanes::exp;
+
+use crate::lanes::{Lanes, exp};
 
 /// A truncated Gaussian.
 #[derive(Clone, Debug)]
@@ -34,9 +35,9 @@ impl Gaussian {
 }
 
 /// exp(−x²/2).
-#[inline]
-fn bell(x: f32) -> f32 {
-    exp(-0.5 * x * x)
+#[inline(always)]
+fn bell<F: Lanes>(x: F) -> F {
+    exp(F::splat(-0.5) * x * x)
 }
 
 impl Default for Gaussian {
@@ -45,12 +46,16 @@ impl Default for Gaussian {
     }
 }
 
+impl Gaussian {
+    #[inline(always)]
+    pub(super) fn weight<F: Lanes>(&self, x: F) -> F {
+        let bell = bell(x / F::splat(self.stddev)) - F::splat(self.floor);
+        bell.max(F::zero())
+    }
+}
+
 impl Kernel for Gaussian {
     fn radius(&self) -> f32 {
         4.0 * self.stddev
-    }
-
-    fn eval(&self, x: f32) -> f32 {
-        (bell(x / self.stddev) - self.floor).max(0.0)
     }
 }

@@ -1,9 +1,12 @@
 //! `lanczos`:
 
+use std::f32::consts::PI;
+
 use super::Kernel;
 use crate::description::Properties;
 use crate::description::declared::{Plugin, integer};
 use crate::error::Result;
+use crate::lanes::{Lanes, sin_cos};
 
 /// A windowed sinc.
 #[derive(Clone, Debug)]
@@ -27,20 +30,19 @@ impl Lanczos {
     }
 }
 
+impl Lanczos {
+    #[inline(always)]
+    pub(super) fn weight<F: Lanes>(&self, x: F) -> F {
+        let x = x.abs() * F::splat(PI);
+        let window = x / F::splat(self.lobes);
+        let lobes = (sin_cos(x).0 / x) * (sin_cos(window).0 / window);
+        let weight = F::select(x.lt(F::splat(1e-4)), F::one(), lobes);
+        F::select(window.le(F::splat(PI)), weight, F::zero())
+    }
+}
+
 impl Kernel for Lanczos {
     fn radius(&self) -> f32 {
         self.lobes
-    }
-
-    fn eval(&self, x: f32) -> f32 {
-        let x = std::f32::consts::PI * x.abs();
-        let window = x / self.lobes;
-        if window > std::f32::consts::PI {
-            0.0
-        } else if x < 1e-4 {
-            1.0
-        } else {
-            (x.sin() / x) * (window.sin() / window)
-        }
     }
 }

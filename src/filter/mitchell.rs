@@ -4,6 +4,7 @@ use super::Kernel;
 use crate::description::Properties;
 use crate::description::declared::{Plugin, float};
 use crate::error::Result;
+use crate::lanes::Lanes;
 
 /// A cubic of radius 2.
 #[derive(Clone, Debug)]
@@ -29,12 +30,15 @@ impl Mitchell {
     }
 }
 
+impl Mitchell {
+    #[inline(always)]
+    pub(super) fn weight<F: Lanes>(&self, x: F) -> F {
+        super::cubic(self.b, self.c, x)
+    }
+}
+
 impl Kernel for Mitchell {
     fn radius(&self) -> f32 {
         2.0
-    }
-
-    fn eval(&self, x: f32) -> f32 {
-        super::cubic(self.b, self.c, x)
     }
 }

@@ -4,6 +4,7 @@ use super::Kernel;
 use crate::description::Properties;
 use crate::description::declared::{Plugin, float};
 use crate::error::Result;
+use crate::lanes::Lanes;
 
 /// A triangle.
 #[derive(Clone, Debug)]
@@ -25,12 +26,15 @@ impl Tent {
     }
 }
 
+impl Tent {
+    #[inline(always)]
+    pub(super) fn weight<F: Lanes>(&self, x: F) -> F {
+        (F::one() - x.abs() / F::splat(self.radius)).max(F::zero())
+    }
+}
+
 impl Kernel for Tent {
     fn radius(&self) -> f32 {
         self.radius
-    }
-
-    fn eval(&self, x: f32) -> f32 {
-        (1.0 - x.abs() / self.radius).max(0.0)
     }
 }

@@ -52,12 +52,21 @@ pub struct Estimate<S> {
 }
 
 /// What the starts of a batch came to.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Estimates<S> {
     /// One a start.
     pub values: Vec<Estimate<S>>,
     /// For each start the values of [`Estimator::extra_channels`].
     pub extra: Vec<f32>,
+}
+
+impl<S> Default for Estimates<S> {
+    fn default() -> Self {
+        Self {
+            values: Vec::new(),
+            extra: Vec::new(),
+        }
+    }
 }
 
 /// What every integrator does.

@@ -32,6 +32,19 @@ pub use vector::{Vec2, Vec3};
 /// No lanes are more.
 pub const MAX_LANES: usize = 16;
 
+/// No table from which lanes gather has more entries.
+pub const MAX_TABLE: usize = 1 << 31;
+
+/// The index of a table's last entry.
+#[inline(always)]
+fn last_of<T>(table: &[T]) -> u32 {
+    assert!(
+        (1..=MAX_TABLE).contains(&table.len()),
+        "a table to gather from"
+    );
+    (table.len() - 1) as u32
+}
+
 /// Something to be done over lanes of some width. `run` must be `#[inline(always)]`.
 pub trait Task {
     /// What comes of it.
@@ -85,6 +98,24 @@ pub trait Lanes:
     fn load(row: &Self::Row) -> Self;
     /// To a row.
     fn store(self, row: &mut Self::Row);
+    /// The first numbers of a slice.
+    ///
+    /// # Panics
+    /// Where there are fewer than lanes.
+    fn from_slice(values: &[f32]) -> Self;
+    /// To the first numbers of a slice.
+    ///
+    /// # Panics
+    /// Where there are fewer than lanes.
+    fn store_to(self, values: &mut [f32]);
+    /// The sum of [`MAX_LANES`] numbers, which stand in as many of the first of `parts` as that takes: those of the second
+    /// half are added to those of the first, and so on.
+    fn sum(parts: &[Self; MAX_LANES]) -> f32;
+    /// The entries of a table; what is beyond its end is its last.
+    ///
+    /// # Panics
+    /// Where the table is empty, or has more than [`MAX_TABLE`] entries.
+    fn gather(table: &[f32], index: Self::Int) -> Self;
     /// One lane's number.
     fn lane(self, lane: usize) -> f32;
 
@@ -200,6 +231,8 @@ pub trait Ints:
 
     /// An integer for each lane.
     type Row: Copy + Debug + Index<usize, Output = u32>;
+    /// Zeros.
+    const ROW: Self::Row;
 
     /// The same in all lanes.
     fn splat(value: u32) -> Self;
@@ -207,6 +240,12 @@ pub trait Ints:
     fn load(row: &Self::Row) -> Self;
     /// To a row.
     fn store(self, row: &mut Self::Row);
+    /// The entries of a table, as [`Lanes::gather`].
+    fn gather(table: &[u32], index: Self) -> Self;
+    /// `self` where it is less, else `other`, both without a sign.
+    fn min(self, other: Self) -> Self;
+    /// `yes` where the mask is set, else `no`.
+    fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
     /// With zeros from below.
     fn shl<const N: u32>(self) -> Self;
     /// With zeros from above.

@@ -2,7 +2,7 @@
 
 use std::num::Wrapping;
 
-use super::{Call, Doubles, Ints, Lanes, Mask};
+use super::{Call, Doubles, Ints, Lanes, MAX_LANES, Mask, last_of};
 
 impl Lanes for f32 {
     const WIDTH: usize = 1;
@@ -28,6 +28,30 @@ impl Lanes for f32 {
     #[inline(always)]
     fn store(self, row: &mut Self::Row) {
         row[0] = self;
+    }
+    #[inline(always)]
+    fn from_slice(values: &[f32]) -> Self {
+        values[0]
+    }
+    #[inline(always)]
+    fn store_to(self, values: &mut [f32]) {
+        values[0] = self;
+    }
+    #[inline(always)]
+    fn sum(parts: &[Self; MAX_LANES]) -> f32 {
+        let mut sums = *parts;
+        let mut half = MAX_LANES / 2;
+        while half > 0 {
+            for i in 0..half {
+                sums[i] += sums[i + half];
+            }
+            half /= 2;
+        }
+        sums[0]
+    }
+    #[inline(always)]
+    fn gather(table: &[f32], index: Wrapping<u32>) -> Self {
+        table[index.0.min(last_of(table)) as usize]
     }
     #[inline(always)]
     fn lane(self, _lane: usize) -> f32 {
@@ -94,6 +118,7 @@ impl Ints for Wrapping<u32> {
     type Float = f32;
     type Mask = bool;
     type Row = [u32; 1];
+    const ROW: [u32; 1] = [0; 1];
 
     #[inline(always)]
     fn splat(value: u32) -> Self {
@@ -106,6 +131,18 @@ impl Ints for Wrapping<u32> {
     #[inline(always)]
     fn store(self, row: &mut [u32; 1]) {
         row[0] = self.0;
+    }
+    #[inline(always)]
+    fn gather(table: &[u32], index: Self) -> Self {
+        Self(table[index.0.min(last_of(table)) as usize])
+    }
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        Self(self.0.min(other.0))
+    }
+    #[inline(always)]
+    fn select(mask: bool, yes: Self, no: Self) -> Self {
+        if mask { yes } else { no }
     }
     #[inline(always)]
     fn shl<const N: u32>(self) -> Self {

@@ -99,6 +99,8 @@ impl Task for Everything<'_> {
     #[inline(always)]
     fn run<F: Lanes>(self) -> Vec<Vec<u32>> {
         let mut all = Vec::new();
+        let numbers: Vec<f32> = self.0.iter().take(11).map(|pair| pair[0]).collect();
+        let integers: Vec<u32> = (1..300).collect();
         for pairs in self.0.chunks(F::WIDTH) {
             let a = F::from_fn(|lane| pairs[lane][0]);
             let b = F::from_fn(|lane| pairs[lane][1]);
@@ -136,6 +138,10 @@ impl Task for Everything<'_> {
                 (bits_a.shl::<5>() ^ bits_b.shr::<7>()).from_bits(),
                 number(bits_a.lt(bits_b)),
                 number(bits_a.eq(bits_a)),
+                bits_a.min(bits_b).from_bits(),
+                F::Int::select(a.lt(b), bits_a, bits_b).from_bits(),
+                F::gather(&numbers, bits_a.shr::<28>()),
+                F::Int::gather(&integers, bits_b).from_bits(),
                 (wide_a * wide_b + wide_a / wide_b - (-wide_b)).narrow(),
                 wide_a.abs().sqrt().narrow(),
                 wide_a.min(wide_b).narrow(),

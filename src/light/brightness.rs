@@ -6,10 +6,11 @@
 
 use glam::{Vec2, Vec3};
 
+use super::grid::Grid;
 use super::{interaction, mean_lane};
 use crate::color::ColorModel;
 use crate::interaction::Interaction;
-use crate::math::distribution::{Discrete, Grid};
+use crate::math::distribution::Discrete;
 use crate::shape::{Geometry, Surface, SurfaceSample, area_to_solid_angle};
 use crate::texture::Texture;
 
@@ -143,7 +144,10 @@ impl Brightness {
         let sample = if u.x < self.share {
             let u = Vec2::new((u.x / self.share).min(1f32.next_down()), u.y);
             match (&self.places, shape) {
-                (Places::Square(grid), _) => shape.chart(grid.sample(u).place)?.point,
+                (Places::Square(grid), _) => {
+                    let (place, _) = grid.sample::<f32>(u.into());
+                    shape.chart(place.into())?.point
+                }
                 (Places::Triangles(triangles), Geometry::Mesh(mesh)) => {
                     let drawn = triangles.sample(u.x);
                     mesh.triangle_point(drawn.index as u32, Vec2::new(drawn.rest, u.y))
@@ -164,7 +168,8 @@ impl Brightness {
             (Places::Square(grid), _) => {
                 let p = shape.parameters(at.primitive, at.barycentric, at.uv);
                 let stretch = shape.chart(p).map_or(0.0, |place| place.stretch);
-                grid.pdf(p) * area_to_solid_angle(stretch, from, at.position, at.normal)
+                grid.pdf::<f32>(p.into())
+                    * area_to_solid_angle(stretch, from, at.position, at.normal)
             }
             (Places::Triangles(triangles), Geometry::Mesh(mesh)) => {
                 let probability = triangles.probability(at.primitive as usize);

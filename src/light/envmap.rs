@@ -10,13 +10,13 @@ use std::f32::consts::{PI, TAU};
 use glam::{Mat3, Vec2, Vec3};
 
 use super::block::{self, BlockEmitter};
+use super::grid::Grid;
 use super::{Emitter, LightContext, LightSample, LightSamples, rotation};
-use crate::color::{ColorModel, Role, Spectra, Spectral, luminance};
+use crate::color::{ColorModel, Pixels, Role, Spectra as _, luminance};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, boolean, file, float};
 use crate::error::Result;
-use crate::lanes::{self, Lanes, Mask as _};
-use crate::math::distribution::Grid;
+use crate::lanes::{self, Ints as _, Lanes, Mask as _};
 use crate::texture::Picture;
 
 /// An image of the surroundings.
@@ -24,17 +24,14 @@ use crate::texture::Picture;
 pub struct Envmap<C: ColorModel> {
     width: usize,
     height: usize,
-    texels: Vec<C::Texel>,
+    texels: C::Texels,
     scale: f32,
     to_world: Mat3,
-    /// Over [`Point`]s; `None` where all is black.
+    /// Over points in [0, 1]²: 0 is the first texel's centre across, the first row's down. `None` where all is black.
     cells: Option<Grid>,
     /// The mean luminance over all directions.
     mean: f64,
 }
-
-/// A place on the grid of cells, in [0, 1]²: 0 is the first texel's centre across, the first row's down.
-type Point = Vec2;
 
 /// The smallest sine of the polar angle that densities know of.
 const LEAST_SINE: f32 = 1e-7;
@@ -66,15 +63,14 @@ impl<C: ColorModel> Envmap<C> {
         let scale = properties.float("scale")?;
         let to_world = rotation(properties)?;
         let picture = Picture::read(&path, false).map_err(|e| e.at(properties.location()))?;
-        let [width, height] = size(&picture);
+        let picture = completed(picture);
+        let [width, height] = picture.size;
         let color = &context.palettes.colors.color;
         let weights = weights(&picture);
         Ok(Self {
             width,
             height,
-            texels: texels(&picture)
-                .map(|rgb| color.texel(rgb, Role::Emission))
-                .collect(),
+            texels: color.texels(&picture.pixels, Role::Emission),
             scale: scale as f32,
             to_world,
             cells: Grid::new(width, &weights).filter(|_| scale > 0.0),
@@ -117,16 +113,25 @@ impl<C: ColorModel> Envmap<C> {
         (world.normalize(), sin)
     }
 
+    /// The radiance of points.
     #[inline(always)]
-    fn radiance(&self, p: Point, wavelengths: &C::Wavelengths) -> C::Sample {
-        let q = p * Vec2::new(self.width as f32, (self.height - 1) as f32);
-        let x = (q.x as usize).min(self.width - 1);
-        let y = (q.y as usize).min(self.height - 2);
-        let f = q - Vec2::new(x as f32, y as f32);
-        let texel = |x, y| C::evaluate_texel(&self.texels[y * self.width + x], wavelengths);
-        let next = (x + 1) % self.width;
-        let row = |y| texel(x, y) * (1.0 - f.x) + texel(next, y) * f.x;
-        (row(y) * (1.0 - f.y) + row(y + 1) * f.y) * self.scale
+    fn radiance<F: Lanes>(&self, p: lanes::Vec2<F>, w: &[C::Wavelengths]) -> C::Columns<F> {
+        let [width, height] = [self.width, self.height].map(|n| n as u32);
+        let all = |n: u32| F::Int::splat(n);
+        let (qx, qy) = (
+            p.x * F::splat(width as f32),
+            p.y * F::splat((height - 1) as f32),
+        );
+        let x = qx.to_int().min(all(width - 1));
+        let y = qy.to_int().min(all(height - 2));
+        let (fx, fy) = (qx - x.to_float(), qy - y.to_float());
+        let next = F::Int::select(x.eq(all(width - 1)), all(0), x + all(1));
+        let texel = |index| C::evaluate_texels(&self.texels, index, w);
+        let (upper, lower) = (y * all(width), (y + all(1)) * all(width));
+        let (gx, gy) = (F::one() - fx, F::one() - fy);
+        let above = texel(upper + x) * gx + texel(upper + next) * fx;
+        let below = texel(lower + x) * gx + texel(lower + next) * fx;
+        (above * gy + below * fy) * F::splat(self.scale)
     }
 
     /// Density per solid angle of a point drawn with that density.
@@ -136,22 +141,28 @@ impl<C: ColorModel> Envmap<C> {
     }
 }
 
-/// Columns and rows: one at each pole and one between them at the least.
-fn size(picture: &Picture) -> [usize; 2] {
-    let [width, height] = picture.size();
-    [width, height.max(3)]
-}
+/// The least rows: one at each pole and one between them.
+const LEAST_ROWS: usize = 3;
 
-/// The texels of all rows; those that the image lacks are its last one, as in Mitsuba.
-fn texels(picture: &Picture) -> impl Iterator<Item = [f32; 3]> {
-    let last = picture.size()[1] - 1;
-    (0..size(picture)[1]).flat_map(move |y| picture.row(y.min(last)))
+/// With rows enough: those that the image lacks are its last one, as in Mitsuba.
+fn completed(Picture { size, pixels }: Picture) -> Picture {
+    let [width, height] = size;
+    if height >= LEAST_ROWS {
+        return Picture { size, pixels };
+    }
+    let last = (width * (height - 1)..width * height).cycle();
+    let lacking = last.take(width * (LEAST_ROWS - height));
+    let all = (0..width * height).chain(lacking);
+    Picture {
+        size: [width, LEAST_ROWS],
+        pixels: Pixels::Linear(all.map(|index| pixels.get(index)).collect()),
+    }
 }
 
 /// What each cell may emit, row by row.
-fn weights(picture: &Picture) -> Vec<f64> {
-    let [width, height] = size(picture);
-    let bright: Vec<f32> = texels(picture)
+fn weights(Picture { size, pixels }: &Picture) -> Vec<f64> {
+    let [width, height] = *size;
+    let bright: Vec<f32> = (pixels.iter())
         .map(|rgb| luminance(rgb.map(f32::abs)))
         .collect();
     let cosine = |row: usize| (std::f64::consts::PI * row as f64 / (height - 1) as f64).cos();
@@ -171,31 +182,18 @@ impl<C: ColorModel> BlockEmitter<C> for Envmap<C> {
         _from: lanes::Vec3<F>,
         u: lanes::Vec2<F>,
         w: &[C::Wavelengths],
-        active: F::Mask,
+        _active: F::Mask,
     ) -> LightSamples<F, C::Columns<F>> {
         let Some(cells) = &self.cells else {
             return LightSamples::none();
         };
-        let (mut place, mut density) = ([F::ROW; 2], F::ROW);
-        // First all cells, then all texels: so lanes wait for memory together, and not one after another.
-        for lane in active.lanes() {
-            let cell = cells.sample(u.lane(lane));
-            (place[0][lane], place[1][lane]) = (cell.place.x, cell.place.y);
-            density[lane] = cell.density;
-        }
-        let there = active.to_bits();
-        let radiance = Spectra::from_samples(|lane| {
-            if there >> lane & 1 == 0 {
-                return C::Sample::zero();
-            }
-            self.radiance(Vec2::new(place[0][lane], place[1][lane]), &w[lane])
-        });
-        let (direction, sine) = self.direction(lanes::Vec2::<F>::load(&place));
+        let (place, density) = cells.sample(u);
+        let (direction, sine) = self.direction(place);
         LightSamples {
             direction,
             distant: F::Mask::splat(true),
-            radiance,
-            pdf: Self::per_solid_angle(F::load(&density), sine),
+            radiance: self.radiance(place, w),
+            pdf: Self::per_solid_angle(density, sine),
             ..LightSamples::none()
         }
     }
@@ -216,14 +214,16 @@ impl<C: ColorModel> Emitter<C> for Envmap<C> {
     }
 
     fn environment_radiance(&self, direction: Vec3, wavelengths: &C::Wavelengths) -> C::Sample {
-        self.radiance(self.point::<f32>(direction.into()).into(), wavelengths)
+        let place = self.point::<f32>(direction.into());
+        let w = std::slice::from_ref(wavelengths);
+        self.radiance(place, w).sample(0)
     }
 
     fn environment_pdf(&self, direction: Vec3) -> f32 {
         let Some(cells) = &self.cells else {
             return 0.0;
         };
-        let p = Vec2::from(self.point::<f32>(direction.into()));
+        let p = self.point::<f32>(direction.into());
         Self::per_solid_angle(cells.pdf(p), lanes::sin_cos(PI * p.y).0)
     }
 

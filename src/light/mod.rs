@@ -7,6 +7,7 @@ mod brightness;
 mod constant;
 mod directional;
 mod envmap;
+mod grid;
 mod point;
 mod projector;
 mod spot;

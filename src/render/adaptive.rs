@@ -15,19 +15,19 @@
 //!
 //! What follows the pilot is one set of the sampler's as large as is needed, from a ladder of sizes.
 
-use super::blocks::{Blocks, Grid, Record};
 use super::checkpoint::Keeper;
 use super::options::Adaptive;
 use super::plan::{Completed, PASS};
 use super::prepare::Job;
 use super::progress::{Phase, Progress};
-use super::samples::{self, Place, Sink};
-use super::sums::{Summed, Sums, Tally, splat};
+use super::samples::{self, Sink};
 use super::unit;
 use crate::color::{ColorModel, luminance};
 use crate::error::{Error, Result};
+use crate::film::{Blocks, GROUP, Grid, Group, Record, Summed, Sums, Tally};
 use crate::filter::Filter;
 use crate::image::Image;
+use crate::lanes::Kernel;
 use crate::math::random;
 use crate::sampler::{Sampler, Stream};
 use crate::sensor::Window;
@@ -168,7 +168,7 @@ pub(super) fn render<C: ColorModel>(
         )
         .help("take another --sampler, or --spp in place of --noise-threshold"));
     }
-    let grid = Grid::new(&job.view.film, job.channels().len());
+    let grid = Grid::new(&job.view.film, job.layout().count());
     let passes = ladder.limits()[1].div_ceil(2 * PASS) as usize;
     let pilots = grid.tiles();
     let mut summed = Summed {
@@ -248,10 +248,9 @@ fn pilot<C: ColorModel>(
                 seen: 0,
                 sets: Vec::new(),
             };
-            let samples = pixels_of(grid.block(block)).flat_map(|pixel| {
-                (0..ladder.begun()).map(move |i| (pixel, stream(job.seed, half, false, pixel, i)))
-            });
-            samples::estimate(job, &ladder.pilot, samples, progress, &mut spread);
+            let pixels = pixels_of(grid.block(block)).map(|pixel| (pixel, 0..ladder.begun()));
+            let stream = |pixel, index| stream(job.seed, half, false, pixel, index);
+            samples::estimate(job, &ladder.pilot, pixels, stream, progress, &mut spread);
             *spread.record.record.samples_mut() = ladder.begun().into();
             spread
         });
@@ -349,11 +348,9 @@ impl Rest {
             let sampler = &ladder.steps[self.steps[slot] - 1].sampler;
             let mut sink = HalfBlock::new(job, grid, slot);
             let count = indices.len() as u32;
-            let samples = pixels_of(grid.block(slot / 2)).flat_map(|pixel| {
-                let at = move |i| (pixel, stream(job.seed, slot % 2, true, pixel, i));
-                indices.clone().map(at)
-            });
-            samples::estimate(job, sampler, samples, progress, &mut sink);
+            let pixels = pixels_of(grid.block(slot / 2)).map(|pixel| (pixel, indices.clone()));
+            let stream = |pixel, index| stream(job.seed, slot % 2, true, pixel, index);
+            samples::estimate(job, sampler, pixels, stream, progress, &mut sink);
             *sink.record.samples_mut() = count.into();
             tally.add(&sink.tally);
             records.push(sink.record);
@@ -391,11 +388,10 @@ impl Sink for HalfBlock<'_> {
         &mut self.tally
     }
 
-    fn take(&mut self, place: &Place, channels: &[f32]) {
-        if self.tally.accepts(place.0, channels) {
-            let sums = self.record.sums_mut();
-            splat(sums, &self.reach, self.filter, *place, channels);
-        }
+    fn take(&mut self, kernel: Kernel, group: &Group, values: &[[f32; GROUP]]) {
+        let sums = self.record.sums_mut();
+        let dropped = group.splat(kernel, self.filter, values, &self.reach, sums);
+        self.tally.drop(group.pixel, dropped);
     }
 }
 
@@ -414,18 +410,24 @@ impl Sink for Spread<'_> {
         self.record.tally()
     }
 
-    fn take(&mut self, place: &Place, channels: &[f32]) {
-        if self.seen.is_multiple_of(self.set) {
-            self.sets.push(0.0);
+    fn take(&mut self, kernel: Kernel, group: &Group, values: &[[f32; GROUP]]) {
+        let [red, green, blue, ..] = values else {
+            return;
+        };
+        let colors = red.iter().zip(green).zip(blue).take(group.count);
+        for ((r, g), b) in colors {
+            if self.seen.is_multiple_of(self.set) {
+                self.sets.push(0.0);
+            }
+            self.seen += 1;
+            let y = luminance([*r, *g, *b]);
+            if let Some(sum) = self.sets.last_mut()
+                && y.is_finite()
+            {
+                *sum += f64::from(y);
+            }
         }
-        self.seen += 1;
-        let y = luminance([channels[0], channels[1], channels[2]]);
-        if let Some(sum) = self.sets.last_mut()
-            && y.is_finite()
-        {
-            *sum += f64::from(y);
-        }
-        self.record.take(place, channels);
+        self.record.take(kernel, group, values);
     }
 }
 
@@ -477,8 +479,8 @@ pub(super) fn report<C: ColorModel>(
 /// error of its luminance: half the difference of the halves' images, as its root mean square over a block.
 pub(super) fn develop<C: ColorModel>(job: &Job<'_, C>, blocks: &Blocks) -> Result<Image> {
     let film = &job.view.film;
-    let halves = blocks.halves(&job.channels())?;
-    let mut sums = Sums::new(film.shown(), job.channels())?;
+    let halves = blocks.halves(&job.layout())?;
+    let mut sums = Sums::new(film.shown(), job.layout())?;
     for half in &halves {
         sums.add_film(half);
     }

@@ -15,9 +15,9 @@ use serde::{Deserialize, Serialize};
 
 use super::fingerprint::Fingerprint;
 use super::options::Checkpoint;
-use super::sums::{Accumulator, Summed, Tally};
 use crate::error::{Error, Problem, Result};
 use crate::file;
+use crate::film::{Accumulator, Summed, Tally};
 
 impl Checkpoint {
     /// Removes the file, if there is one: the image is written, and there is nothing left to continue.

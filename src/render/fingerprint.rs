@@ -10,12 +10,12 @@ use std::path::{Path, PathBuf};
 use blake3::Hasher;
 use serde::{Deserialize, Serialize};
 
-use super::blocks::BLOCK;
 use super::options::{Colors, Options};
 use super::plan::{PASS, TILE};
 use crate::description::{Canonical, Description, NodeId, Part};
 use crate::error::{Error, Result};
 use crate::file;
+use crate::film::BLOCK;
 
 /// What an image depends on, part by part.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]

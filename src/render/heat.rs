@@ -8,11 +8,12 @@ use rayon::prelude::*;
 use super::plan::PASS;
 use super::prepare::Job;
 use super::progress::{Phase, Progress, Silent};
-use super::samples::{self, Place, Sink};
-use super::sums::Tally;
+use super::samples::{self, Sink};
 use crate::color::ColorModel;
 use crate::error::{Error, Result};
+use crate::film::{GROUP, Group, Tally};
 use crate::integrator::Stats;
+use crate::lanes::Kernel;
 use crate::sampler::Stream;
 
 /// Counts by pixel.
@@ -36,7 +37,7 @@ impl Sink for Counted {
         &mut self.0
     }
 
-    fn take(&mut self, _: &Place, _: &[f32]) {}
+    fn take(&mut self, _: Kernel, _: &Group, _: &[[f32; GROUP]]) {}
 }
 
 /// Traces the job's crop.
@@ -61,8 +62,10 @@ pub(super) fn count<C: ColorModel>(job: &Job<'_, C>, progress: &dyn Progress) ->
         let mut of_row = Stats::default();
         for (steps, x) in row.iter_mut().zip(crop.x..) {
             let mut sink = Counted(Tally::default());
-            let streams = (0..samples).map(|i| ([x, y], Stream::new(job.seed, x, y, i)));
-            samples::estimate(job, &job.view.sampler, streams, &Silent, &mut sink);
+            let pixels = std::iter::once(([x, y], 0..samples));
+            let stream = |[x, y]: [u32; 2], index| Stream::new(job.seed, x, y, index);
+            let sampler = &job.view.sampler;
+            samples::estimate(job, sampler, pixels, stream, &Silent, &mut sink);
             let counted = sink.0.stats;
             *steps = counted.tracing.node_steps as f32 / samples as f32;
             of_row.add(&counted);

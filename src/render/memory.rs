@@ -5,10 +5,10 @@
 use std::io::Read;
 use std::path::Path;
 
-use super::blocks::Grid;
 use crate::description::{Description, Part};
 use crate::error::{Error, Result};
 use crate::file::text;
+use crate::film::Grid;
 use crate::mesh;
 use crate::sensor::Film;
 

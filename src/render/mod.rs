@@ -8,7 +8,6 @@ mod progress;
 mod adaptive;
 mod bare;
 mod black;
-mod blocks;
 mod check;
 mod checkpoint;
 mod fingerprint;
@@ -22,7 +21,6 @@ mod prepare;
 mod samples;
 mod sensors;
 mod session;
-mod sums;
 mod uniform;
 mod unit;
 
@@ -144,7 +142,7 @@ impl Seconds {
         }
     }
 
-    fn spend(&mut self, times: &sums::Times) {
+    fn spend(&mut self, times: &crate::film::Times) {
         self.closest = times.closest;
         self.occluded = times.occluded;
         self.shade = times.shade;

@@ -18,6 +18,7 @@ use crate::accel::{Build, CacheUse, Method, Recipe};
 use crate::color::ColorModel;
 use crate::description::{Description, Kind, NodeId, Properties};
 use crate::error::{self, Error, Location, Problem, Problems, Result};
+use crate::film::Layout;
 use crate::image::{self, Metadata, Window};
 use crate::integrator::{self, Estimator, Footprint, Integrator};
 use crate::mesh::ReadMesh;
@@ -359,14 +360,15 @@ pub(super) fn prepare<'k, C: ColorModel>(ask: &'k mut Ask<'_>, color: C) -> Resu
     let sensor = problems.take(sensor(description, options));
     let view = sensor.and_then(|sensor| problems.take(view::<C>(description, sensor)));
     let view = view.filter(|view| {
-        let names = channels(&color, &view.integrator);
-        let fit = image::check_channels(&names).map_err(|error| integrator_at(description, error));
+        let layout = layout(&color, &view.integrator);
+        let fit = image::check_channels(layout.names())
+            .map_err(|error| integrator_at(description, error));
         problems.take(fit).is_some()
     });
     let share = view.as_ref().map(|view| Share {
         film: memory::film(
             &view.film,
-            channels(&color, &view.integrator).len(),
+            layout(&color, &view.integrator).count(),
             options.adaptive.is_some(),
         ),
         rays: rays(&view.film, view.sampler.sample_count()),
@@ -432,18 +434,15 @@ fn integrator_at(description: &Description, error: Error) -> Error {
     }
 }
 
-/// The sums' channels: the colours, the integrator's own and, last, opacity.
-fn channels<C: ColorModel>(color: &C, integrator: &Integrator<C>) -> Vec<String> {
-    let mut channels = color.channels();
-    channels.extend(integrator.extra_channels());
-    channels.push("A".into());
-    channels
+/// The channels of samples.
+fn layout<C: ColorModel>(color: &C, integrator: &Integrator<C>) -> Layout {
+    Layout::new(color.channels(), integrator.extra_channels())
 }
 
 impl<C: ColorModel> Job<'_, C> {
-    /// The sums' channels: the colours, the integrator's own and, last, opacity.
-    pub(super) fn channels(&self) -> Vec<String> {
-        channels(self.scene.color(), &self.view.integrator)
+    /// The channels of samples.
+    pub(super) fn layout(&self) -> Layout {
+        layout(self.scene.color(), &self.view.integrator)
     }
 
     /// What the image depends on; the scene's files are read for it once.

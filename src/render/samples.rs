@@ -1,83 +1,130 @@
 //! Camera samples: from their places on the film to what the integrator and the colour model make of them,
 //! a batch at a time.
 
+use std::ops::Range;
 use std::time::{Duration, Instant};
 
 use glam::Vec2;
 
 use super::prepare::{Job, View};
 use super::progress::Progress;
-use super::sums::Tally;
 use crate::color::ColorModel;
-use crate::integrator::{Cost, Estimates, Estimator, Start};
+use crate::film::{GROUP, Group, Layout, Tally};
+use crate::integrator::{Cost, Estimate, Estimates, Estimator as _, Start};
+use crate::lanes::Kernel;
 use crate::sampler::{Sampler, Stream};
 
 /// Bytes of path state in flight in a batch: within a core's caches, with rays enough for the tracer.
 const BATCH_BYTES: usize = 512 << 10;
 
-/// Where a sample lies: its pixel, and its offset in [0, 1)² within.
-pub(super) type Place = ([u32; 2], Vec2);
-
-/// Estimates the samples of one sampler, in the order of `samples`, and gives each one's place and channels
-/// to `sink` in that order; what it cost is counted in `sink`'s tally.
+/// Estimates samples of one sampler, pixel by pixel, each with the indices of its samples, whose streams `stream` tells;
+/// and gives them to `sink` in that order, in groups of samples that follow one another; what it cost is counted in
+/// `sink`'s tally.
 pub(super) fn estimate<C: ColorModel, S: Sink>(
     job: &Job<'_, C>,
     sampler: &Sampler,
-    samples: impl Iterator<Item = ([u32; 2], Stream)>,
+    pixels: impl Iterator<Item = ([u32; 2], Range<u32>)>,
+    stream: impl Fn([u32; 2], u32) -> Stream,
     progress: &dyn Progress,
     sink: &mut S,
 ) {
     let begin = Instant::now();
-    let (mut cost, mut film) = (Cost::default(), Duration::ZERO);
-    let batch = BATCH_BYTES / size_of::<Start<C>>() / 4;
-    let mut starts: Vec<Start<C>> = Vec::with_capacity(batch);
-    let mut places: Vec<Place> = Vec::with_capacity(batch);
-    let mut estimates = Estimates {
-        values: Vec::new(),
-        extra: Vec::new(),
+    let mut batch = Batch {
+        job,
+        sampler,
+        progress,
+        layout: job.layout(),
+        starts: Vec::new(),
+        groups: Vec::new(),
+        estimates: Estimates::default(),
+        row: Vec::new(),
+        columns: Vec::new(),
+        cost: Cost::default(),
+        film: Duration::ZERO,
     };
-    let extra = job.view.integrator.extra_channels().len();
-    let mut row = vec![0.0; job.channels().len()];
-    let mut flush = |starts: &mut Vec<Start<C>>, places: &mut Vec<Place>| {
-        let before = cost.stats.rays();
-        let (scene, integrator) = (job.scene, &job.view.integrator);
-        integrator.estimate(scene, sampler, starts, &mut estimates, &mut cost);
-        let rays = cost.stats.rays() - before;
-        let estimated = Instant::now();
-        for (i, (start, place)) in starts.iter().zip(places.iter()).enumerate() {
-            let estimate = &estimates.values[i];
-            scene
-                .color()
-                .develop(&estimate.radiance, &start.wavelengths, &mut row);
-            let opacity = row.len() - 1;
-            row[opacity - extra..opacity].copy_from_slice(&estimates.extra[i * extra..][..extra]);
-            row[opacity] = estimate.alpha;
-            sink.take(place, &row);
-        }
-        film += estimated.elapsed();
-        progress.advance(starts.len() as u64, rays);
-        starts.clear();
-        places.clear();
-    };
-    for (pixel, stream) in samples {
-        let (start, offset) = camera_sample(job, sampler, pixel, stream);
-        starts.push(start);
-        places.push((pixel, offset));
-        if starts.len() == batch {
-            flush(&mut starts, &mut places);
+    let limit = BATCH_BYTES / size_of::<Start<C>>() / 4;
+    for (pixel, indices) in pixels {
+        let mut indices = indices.peekable();
+        while indices.peek().is_some() {
+            if batch.starts.len() + GROUP > limit {
+                batch.flush(sink);
+            }
+            let mut offsets = [Vec2::ZERO; GROUP];
+            let first = batch.starts.len();
+            for (offset, index) in offsets.iter_mut().zip(&mut indices) {
+                let (start, place) = camera_sample(job, sampler, pixel, stream(pixel, index));
+                batch.starts.push(start);
+                *offset = place;
+            }
+            let count = batch.starts.len() - first;
+            batch.groups.push(Group::new(pixel, &offsets[..count]));
         }
     }
-    flush(&mut starts, &mut places);
+    batch.flush(sink);
     let total = begin.elapsed().as_secs_f64();
+    let Batch { cost, film, .. } = batch;
     sink.tally().spend(&cost, total, film.as_secs_f64());
+}
+
+/// Samples that are estimated together.
+struct Batch<'a, C: ColorModel> {
+    job: &'a Job<'a, C>,
+    sampler: &'a Sampler,
+    progress: &'a dyn Progress,
+    layout: Layout,
+    starts: Vec<Start<C>>,
+    /// Of the starts, in their order.
+    groups: Vec<Group>,
+    estimates: Estimates<C::Sample>,
+    /// A sample's colours.
+    row: Vec<f32>,
+    /// A group's values, a row a channel.
+    columns: Vec<[f32; GROUP]>,
+    cost: Cost,
+    /// Time that colours and the film took.
+    film: Duration,
+}
+
+impl<C: ColorModel> Batch<'_, C> {
+    fn flush<S: Sink>(&mut self, sink: &mut S) {
+        let before = self.cost.stats.rays();
+        let (scene, integrator) = (self.job.scene, &self.job.view.integrator);
+        let (starts, estimates) = (&self.starts, &mut self.estimates);
+        integrator.estimate(scene, self.sampler, starts, estimates, &mut self.cost);
+        let estimated = Instant::now();
+        let (layout, color) = (&self.layout, scene.color());
+        let extra = layout.extra().len();
+        self.row.resize(layout.colors().len(), 0.0);
+        self.columns.resize(layout.count(), [0.0; GROUP]);
+        let mut first = 0;
+        for group in &self.groups {
+            for sample in 0..group.count {
+                let index = first + sample;
+                let Estimate { radiance, alpha } = &estimates.values[index];
+                color.develop(radiance, &starts[index].wavelengths, &mut self.row);
+                let extra = &estimates.extra[index * extra..][..extra];
+                let values = self.row.iter().chain(extra).chain([alpha]);
+                for (column, value) in self.columns.iter_mut().zip(values) {
+                    column[sample] = *value;
+                }
+            }
+            first += group.count;
+            sink.take(scene.tracer().kernel(), group, &self.columns);
+        }
+        self.film += estimated.elapsed();
+        let rays = self.cost.stats.rays() - before;
+        self.progress.advance(starts.len() as u64, rays);
+        self.starts.clear();
+        self.groups.clear();
+    }
 }
 
 /// Where samples go.
 pub(super) trait Sink {
     /// What they cost.
     fn tally(&mut self) -> &mut Tally;
-    /// The next sample.
-    fn take(&mut self, place: &Place, channels: &[f32]);
+    /// The next samples of a pixel, whose values stand in a row a channel.
+    fn take(&mut self, kernel: Kernel, group: &Group, values: &[[f32; GROUP]]);
 }
 
 /// The dimensions of a camera sample, after those of its place in the pixel.

@@ -4,12 +4,13 @@ use super::checkpoint::Keeper;
 use super::plan::{Completed, Plan};
 use super::prepare::Job;
 use super::progress::{Phase, Progress};
-use super::samples::{self, Place, Sink};
-use super::sums::{Summed, Sums, Tally};
+use super::samples::{self, Sink};
 use super::unit;
 use crate::color::ColorModel;
 use crate::error::Result;
+use crate::film::{GROUP, Group, Summed, Sums, Tally};
 use crate::filter::Filter;
+use crate::lanes::Kernel;
 use crate::sampler::Stream;
 
 /// Renders the job's crop, going on from what `keeper` kept, until `progress` asks to stop.
@@ -20,7 +21,7 @@ pub(super) fn render<C: ColorModel>(
 ) -> Result<(Summed<Sums>, Completed)> {
     let plan = Plan::new(&job.view.film, job.view.sampler.sample_count());
     let mut summed = Summed {
-        sums: Sums::new(job.view.film.shown(), job.channels())?,
+        sums: Sums::new(job.view.film.shown(), job.layout())?,
         next: 0,
     };
     if let Some(keeper) = &mut keeper {
@@ -47,22 +48,21 @@ fn render_unit<C: ColorModel>(
         fn tally(&mut self) -> &mut Tally {
             &mut self.0.tally
         }
-        fn take(&mut self, (pixel, offset): &Place, channels: &[f32]) {
-            self.0.splat(self.1, *pixel, *offset, channels);
+        fn take(&mut self, kernel: Kernel, group: &Group, values: &[[f32; GROUP]]) {
+            self.0.splat(kernel, self.1, group, values);
         }
     }
     let film = &job.view.film;
     let (tile, indices) = plan.unit(unit);
     let reach = tile.grown(film.filter.reach(), &film.sampled());
-    let sums = Sums::new(reach, job.channels()).expect("a tile is small");
+    let sums = Sums::new(reach, job.layout()).expect("a tile is small");
     let mut sink = Splat(sums, &film.filter);
     let own = tile.grown(0, &plan.needed);
-    let pixels =
-        (own.y..own.y + own.height).flat_map(|y| (own.x..own.x + own.width).map(move |x| (x, y)));
-    let samples = pixels.flat_map(|(x, y)| {
-        let at = move |index| ([x, y], Stream::new(job.seed, x, y, index));
-        indices.clone().map(at)
-    });
-    samples::estimate(job, &job.view.sampler, samples, progress, &mut sink);
+    let pixels = (own.y..own.y + own.height)
+        .flat_map(|y| (own.x..own.x + own.width).map(move |x| [x, y]))
+        .map(|pixel| (pixel, indices.clone()));
+    let stream = |[x, y]: [u32; 2], index| Stream::new(job.seed, x, y, index);
+    let sampler = &job.view.sampler;
+    samples::estimate(job, sampler, pixels, stream, progress, &mut sink);
     sink.0
 }

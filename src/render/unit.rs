@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::checkpoint::Keeper;
 use super::progress::Progress;
-use super::sums::{Accumulator, Summed};
+use crate::film::{Accumulator, Summed};
 
 /// The sums while units are added to them.
 struct Reduction<'k, A: Accumulator> {

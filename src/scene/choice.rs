@@ -5,17 +5,23 @@
 
 use super::LightId;
 use crate::color::ColorModel;
+use crate::lanes::{Ints as _, Lanes};
 use crate::light::Light;
 use crate::math::distribution::Discrete;
 use crate::shape::Bounds;
 
-/// Lights by probability; none where no light can be drawn.
+/// Lights by probability.
 #[derive(Debug)]
 pub(super) struct Choice {
-    lights: Option<Discrete>,
+    /// Of all lights but the first the least random number that it or a later one is chosen for; `None` where no light can
+    /// be drawn.
+    starts: Option<Vec<f32>>,
     /// By light.
     probabilities: Vec<f32>,
 }
+
+/// Up to so many starts are looked at one after another; more are searched by halves.
+const FEW: usize = 8;
 
 /// The share of the choices that does not look at power.
 const EVEN: f64 = 0.5;
@@ -74,19 +80,60 @@ impl Choice {
         };
         Self {
             probabilities: (0..powers.len()).map(probability).collect(),
-            lights,
+            starts: lights.map(|lights| {
+                let start = |light| least(|u| lights.index(u) >= light);
+                (1..powers.len()).map(start).collect()
+            }),
         }
     }
 
     /// The light for `u` in [0, 1).
     pub(super) fn sample(&self, u: f32) -> Option<LightId> {
-        Some(LightId(self.lights.as_ref()?.index(u) as u32))
+        self.sample_lanes(u).map(|light| LightId(light.0))
+    }
+
+    /// The same for paths in lanes: the lights' indices.
+    #[inline(always)]
+    pub(super) fn sample_lanes<F: Lanes>(&self, u: F) -> Option<F::Int> {
+        let starts = self.starts.as_ref()?;
+        let one = F::Int::splat(1);
+        let mut index = F::Int::splat(0);
+        if starts.len() <= FEW {
+            for start in starts {
+                let begun = F::splat(*start).le(u);
+                index = F::Int::select(begun, index + one, index);
+            }
+            return Some(index);
+        }
+        let mut step = starts.len().next_power_of_two() as u32;
+        let count = F::Int::splat(starts.len() as u32);
+        while step > 0 {
+            let next = index + F::Int::splat(step);
+            let begun = F::gather(starts, next - one).le(u) & !count.lt(next);
+            index = F::Int::select(begun, next, index);
+            step /= 2;
+        }
+        Some(index)
     }
 
     /// How likely a light is.
     pub(super) fn probability(&self, light: LightId) -> f32 {
         self.probabilities[light.0 as usize]
     }
+}
+
+/// The least number in [0, 1) of which something holds that holds of all above, or 1.
+fn least(holds: impl Fn(f32) -> bool) -> f32 {
+    let (mut low, mut high) = (0, 1f32.to_bits());
+    while low < high {
+        let middle = (low + high) / 2;
+        if holds(f32::from_bits(middle)) {
+            high = middle;
+        } else {
+            low = middle + 1;
+        }
+    }
+    f32::from_bits(low)
 }
 
 #[cfg(test)]
@@ -117,6 +164,21 @@ mod tests {
         for (i, count) in (0..).zip(counts) {
             let share = count as f32 / n as f32;
             assert!((share - of(i)).abs() < 2e-3, "{i}: {share}");
+        }
+        // Many are searched in another way than few.
+        let powers: Vec<f64> = (0..37).map(|i| f64::from(i % 5)).collect();
+        let many = Choice::by(&powers, &[1.0; 37]);
+        let mut counts = [0; 37];
+        for i in 0..n {
+            let light = many.sample((i as f32 + 0.5) / n as f32).unwrap();
+            counts[light.0 as usize] += 1;
+        }
+        for (i, count) in (0..).zip(counts) {
+            let share = count as f32 / n as f32;
+            assert!(
+                (share - many.probability(LightId(i))).abs() < 1e-3,
+                "{i}: {share}"
+            );
         }
         assert!(Choice::by(&[0.0, 0.0], &[1.0; 2]).sample(0.3).is_none());
         assert!(Choice::by(&[], &[]).sample(0.3).is_none());

@@ -13,7 +13,7 @@ use crate::accel::{Counts, Order, Tracer};
 use crate::color::{ColorModel, Spectral};
 use crate::error::Problem;
 use crate::interaction::{Hit, Interaction, Ray};
-use crate::lanes::{self, Kernel, Lanes, MAX_LANES, Mask as _};
+use crate::lanes::{self, Ints as _, Kernel, Lanes, Mask as _};
 use crate::light::{Light, LightSample, LightSamples};
 use crate::material::Material;
 
@@ -200,19 +200,17 @@ impl<C: ColorModel> Scene<C> {
         active: F::Mask,
     ) -> LightSamples<F, C::Columns<F>> {
         let mut samples = LightSamples::none();
-        let mut chosen = [None; MAX_LANES];
-        for lane in active.lanes() {
-            chosen[lane] = self.choice.sample(u1.lane(lane));
-        }
+        let Some(chosen) = self.choice.sample_lanes(u1) else {
+            return samples;
+        };
+        let mut indices = F::Int::ROW;
+        chosen.store(&mut indices);
         // One light after another.
-        let mut rest = active.to_bits();
-        while rest != 0 {
-            let light = chosen[rest.trailing_zeros() as usize];
-            let alike = (0..F::WIDTH).filter(|lane| chosen[*lane] == light);
-            let alike = rest & alike.fold(0, |bits, lane| bits | 1 << lane);
-            rest &= !alike;
-            let Some(light) = light else { continue };
-            let mask = F::Mask::from_bits(alike);
+        let mut rest = active;
+        while let Some(lane) = rest.lanes().next() {
+            let light = LightId(indices[lane]);
+            let mask = rest & chosen.eq(F::Int::splat(light.0));
+            rest = rest & !mask;
             let mut drawn = self.light(light).sample_lanes(from, u2, w, mask);
             drawn.pdf = drawn.pdf * F::splat(self.choice.probability(light));
             samples = LightSamples::select(mask, drawn, samples);

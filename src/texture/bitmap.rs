@@ -7,18 +7,18 @@ use std::sync::Arc;
 use glam::{Mat3, Vec2};
 
 use super::{Palette, Pattern, Picture, to_uv, transformed};
-use crate::color::{ColorModel, Role, Spectral};
+use crate::color::{ColorModel, Role, Spectra, Spectral};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, boolean, choice, file, string};
 use crate::error::Result;
 use crate::interaction::Interaction;
+use crate::lanes::{self, Ints, Lanes};
 
 /// An image whose texels are ready to be evaluated, row by row from the top.
 #[derive(Debug)]
 pub(super) struct Texels<C: ColorModel> {
-    width: usize,
-    height: usize,
-    texels: Vec<C::Texel>,
+    size: [usize; 2],
+    texels: C::Texels,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -28,23 +28,29 @@ enum Wrap {
     Clamp,
 }
 
+/// The remainder of whole numbers by `n`, in [0, n).
+#[inline(always)]
+fn modulo<F: Lanes>(i: F, n: F) -> F {
+    let rest = i - (i / n).floor() * n;
+    // What the quotient's rounding leaves.
+    let rest = F::select(rest.lt(F::zero()), rest + n, rest);
+    F::select(rest.lt(n), rest, rest - n)
+}
+
 impl Wrap {
-    /// The texel that stands for index `i` of `n`, wherever `i` lies.
-    fn apply(self, i: i64, n: usize) -> usize {
-        let n = n as i64;
-        // As a rule it lies inside, and a division takes long.
-        if (0..n).contains(&i) {
-            return i as usize;
-        }
+    /// The texel that stands for the whole number `i` of `n`, wherever it lies.
+    #[inline(always)]
+    fn apply<F: Lanes>(self, i: F, n: usize) -> F::Int {
+        let (size, last) = (F::splat(n as f32), (n - 1) as f32);
         let wrapped = match self {
-            Self::Repeat => i.rem_euclid(n),
-            Self::Clamp => i.clamp(0, n - 1),
+            Self::Repeat => modulo(i, size),
+            Self::Clamp => i,
             Self::Mirror => {
-                let i = i.rem_euclid(2 * n);
-                i.min(2 * n - 1 - i)
+                let i = modulo(i, size + size);
+                i.min(F::splat(2.0 * n as f32 - 1.0) - i)
             }
         };
-        wrapped as usize
+        wrapped.clamp(0.0, last).to_int()
     }
 }
 
@@ -59,11 +65,11 @@ pub struct Bitmap<C: ColorModel> {
 
 /// Four neighbouring texels.
 #[derive(Clone, Copy, Debug)]
-struct Cell<S> {
+struct Cell<F, S> {
     /// Two rows of two.
     corners: [[S; 2]; 2],
     /// Where the point lies between them, in [0, 1)².
-    f: Vec2,
+    f: lanes::Vec2<F>,
 }
 
 impl<C: ColorModel> Bitmap<C> {
@@ -116,7 +122,8 @@ impl<C: ColorModel> Bitmap<C> {
                 let loaded = load(&key.0, palette, raw).map_err(|e| e.at(properties.location()))?;
                 let Loaded { texels, clamped } = loaded;
                 if clamped > 0 {
-                    let all = texels.texels.len();
+                    let [width, height] = texels.size;
+                    let all = width * height;
                     let message = format!(
                         "{clamped} of {all} texels reflect less than 0 or more than 1, and are clamped"
                     );
@@ -133,50 +140,73 @@ impl<C: ColorModel> Bitmap<C> {
         })
     }
 
-    fn size(&self) -> Vec2 {
-        Vec2::new(self.texels.width as f32, self.texels.height as f32)
+    /// A point in texels, from the upper left corner of the first.
+    #[inline(always)]
+    fn place<F: Lanes>(&self, uv: lanes::Vec2<F>) -> lanes::Vec2<F> {
+        let [width, height] = self.texels.size.map(|n| F::splat(n as f32));
+        let uv = transformed(&self.to_uv, uv);
+        lanes::Vec2::new(uv.x * width, uv.y * height)
     }
 
-    /// The four texels around a point.
+    /// The four texels around points.
     #[inline(always)]
-    fn cell(&self, uv: Vec2, wavelengths: &C::Wavelengths) -> Cell<C::Sample> {
-        let p = transformed(&self.to_uv, uv) * self.size() - 0.5;
-        let corner = p.floor();
-        let (x, y) = (corner.x as i64, corner.y as i64);
-        let Texels {
-            width,
-            height,
-            texels,
-        } = &*self.texels;
+    fn cell<F: Lanes>(
+        &self,
+        uv: lanes::Vec2<F>,
+        wavelengths: &[C::Wavelengths],
+    ) -> Cell<F, C::Columns<F>> {
+        let place = self.place(uv);
+        let (px, py) = (place.x - F::splat(0.5), place.y - F::splat(0.5));
+        let (x, y) = (px.floor(), py.floor());
+        let Texels { size, texels } = &*self.texels;
+        let [width, height] = *size;
         let (left, right) = (
-            self.wrap.apply(x, *width),
-            self.wrap.apply(x.saturating_add(1), *width),
+            self.wrap.apply(x, width),
+            self.wrap.apply(x + F::one(), width),
         );
+        let stride = Ints::splat(width as u32);
         let (upper, lower) = (
-            self.wrap.apply(y, *height) * width,
-            self.wrap.apply(y.saturating_add(1), *height) * width,
+            self.wrap.apply(y, height) * stride,
+            self.wrap.apply(y + F::one(), height) * stride,
         );
-        let texel = |at: usize| C::evaluate_texel(&texels[at], wavelengths);
         Cell {
             corners: [
-                [texel(upper + left), texel(upper + right)],
-                [texel(lower + left), texel(lower + right)],
+                [
+                    C::evaluate_texels(texels, upper + left, wavelengths),
+                    C::evaluate_texels(texels, upper + right, wavelengths),
+                ],
+                [
+                    C::evaluate_texels(texels, lower + left, wavelengths),
+                    C::evaluate_texels(texels, lower + right, wavelengths),
+                ],
             ],
-            f: p - corner,
+            f: lanes::Vec2::new(px - x, py - y),
         }
     }
 
-    /// The texel at a point.
-    fn nearest(&self, uv: Vec2, wavelengths: &C::Wavelengths) -> C::Sample {
-        let Texels {
-            width,
-            height,
-            texels,
-        } = &*self.texels;
-        let p = (transformed(&self.to_uv, uv) * self.size()).floor();
-        let x = self.wrap.apply(p.x as i64, *width);
-        let y = self.wrap.apply(p.y as i64, *height);
-        C::evaluate_texel(&texels[y * width + x], wavelengths)
+    /// The values at points.
+    #[inline(always)]
+    pub(super) fn eval_lanes<F: Lanes>(
+        &self,
+        uv: lanes::Vec2<F>,
+        wavelengths: &[C::Wavelengths],
+    ) -> C::Columns<F> {
+        if self.nearest {
+            let place = self.place(uv);
+            let Texels { size, texels } = &*self.texels;
+            let x = self.wrap.apply(place.x.floor(), size[0]);
+            let y = self.wrap.apply(place.y.floor(), size[1]);
+            let index = y * Ints::splat(size[0] as u32) + x;
+            return C::evaluate_texels(texels, index, wavelengths);
+        }
+        let Cell {
+            corners: [[a, b], [c, d]],
+            f,
+        } = self.cell(uv, wavelengths);
+        let (gx, gy) = (F::one() - f.x, F::one() - f.y);
+        let value = (a * gx + b * f.x) * gy + (c * gx + d * f.x) * f.y;
+        let is_finite = f.x.is_finite() & f.y.is_finite();
+        C::Columns::<F>::select(is_finite, value, Spectra::zero())
     }
 }
 
@@ -191,25 +221,21 @@ fn load<C: ColorModel>(
     palette: &Palette<C>,
     raw: bool,
 ) -> Result<Loaded<C>> {
-    let picture = Picture::read(path, raw)?;
-    let [width, height] = picture.size();
+    let Picture { size, pixels } = Picture::read(path, raw)?;
     let role = if raw && palette.role == Role::Reflectance {
         Role::Quantity
     } else {
         palette.role
     };
-    let mut clamped = 0;
-    let texel = |rgb: [f32; 3]| {
-        let fits = role != Role::Reflectance || rgb.iter().all(|v| (0.0..=1.0).contains(v));
-        clamped += usize::from(!fits);
-        palette.color.texel(rgb, role)
+    let fits = |rgb: [f32; 3]| rgb.iter().all(|v| (0.0..=1.0).contains(v));
+    let clamped = match role {
+        Role::Reflectance => pixels.iter().filter(|rgb| !fits(*rgb)).count(),
+        _ => 0,
     };
-    let texels = picture.texels().map(texel).collect();
     Ok(Loaded {
         texels: Texels {
-            width,
-            height,
-            texels,
+            size,
+            texels: palette.color.texels(&pixels, role),
         },
         clamped,
     })
@@ -217,33 +243,26 @@ fn load<C: ColorModel>(
 
 impl<C: ColorModel> Pattern<C> for Bitmap<C> {
     fn eval(&self, at: &Interaction<'_>, wavelengths: &C::Wavelengths) -> C::Sample {
-        if self.nearest {
-            return self.nearest(at.uv, wavelengths);
-        }
-        let Cell {
-            corners: [[a, b], [c, d]],
-            f,
-        } = self.cell(at.uv, wavelengths);
-        let value = (a * (1.0 - f.x) + b * f.x) * (1.0 - f.y) + (c * (1.0 - f.x) + d * f.x) * f.y;
-        value.map(|v| if v.is_finite() { v } else { 0.0 })
+        let w = std::slice::from_ref(wavelengths);
+        self.eval_lanes::<f32>(at.uv.into(), w).sample(0)
     }
 
     fn gradient(&self, at: &Interaction<'_>, wavelengths: &C::Wavelengths) -> [C::Sample; 2] {
         if self.nearest {
             return [C::Sample::zero(); 2];
         }
-        let Cell {
-            corners: [[a, b], [c, d]],
-            f,
-        } = self.cell(at.uv, wavelengths);
-        let size = self.size();
-        let along_x = ((b - a) * (1.0 - f.y) + (d - c) * f.y) * size.x;
-        let along_y = ((c - a) * (1.0 - f.x) + (d - b) * f.x) * size.y;
+        let cell = self.cell::<f32>(at.uv.into(), std::slice::from_ref(wavelengths));
+        let f = Vec2::from(cell.f);
+        let [[a, b], [c, d]]: [[C::Sample; 2]; 2] =
+            cell.corners.map(|row| row.map(|texel| texel.sample(0)));
+        let [width, height] = self.texels.size.map(|n| n as f32);
+        let along_x = ((b - a) * (1.0 - f.y) + (d - c) * f.y) * width;
+        let along_y = ((c - a) * (1.0 - f.x) + (d - b) * f.x) * height;
         let m = &self.to_uv;
         [m.x_axis, m.y_axis].map(|axis| along_x * axis.x + along_y * axis.y)
     }
 
     fn resolution(&self) -> [usize; 2] {
-        [self.texels.width, self.texels.height]
+        self.texels.size
     }
 }

@@ -7,11 +7,12 @@ use std::any::TypeId;
 use glam::Mat3;
 
 use super::{Palette, Pattern, Texture, to_uv, transformed};
-use crate::color::{ColorModel, Mono};
+use crate::color::{ColorModel, Mono, Spectra};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, texture};
 use crate::error::Result;
-use crate::interaction::Interaction;
+use crate::interaction::{Interaction, Points};
+use crate::lanes::{self, Lanes};
 
 /// Two textures in a pattern of squares.
 #[derive(Clone, Debug)]
@@ -50,11 +51,35 @@ impl<C: ColorModel> Checkerboard<C> {
     }
 }
 
+impl<C: ColorModel> Checkerboard<C> {
+    /// Where the second colour is.
+    #[inline(always)]
+    fn second<F: Lanes>(&self, uv: lanes::Vec2<F>) -> F::Mask {
+        let uv = transformed(&self.to_uv, uv);
+        let half = F::splat(0.5);
+        (uv.x - uv.x.floor()).gt(half) ^ (uv.y - uv.y.floor()).gt(half)
+    }
+
+    /// The values at points.
+    #[inline(always)]
+    pub(super) fn eval_lanes<F: Lanes>(
+        &self,
+        at: &Points<'_, F>,
+        wavelengths: &[C::Wavelengths],
+    ) -> C::Columns<F> {
+        let [first, second] = &*self.colors;
+        C::Columns::<F>::select(
+            self.second(at.uv),
+            second.eval_lanes(at, wavelengths),
+            first.eval_lanes(at, wavelengths),
+        )
+    }
+}
+
 impl<C: ColorModel> Pattern<C> for Checkerboard<C> {
     fn eval(&self, at: &Interaction<'_>, wavelengths: &C::Wavelengths) -> C::Sample {
-        let uv = transformed(&self.to_uv, at.uv);
-        let upper = (uv - uv.floor()).cmpgt(glam::Vec2::splat(0.5));
-        self.colors[usize::from(upper.x != upper.y)].eval(at, wavelengths)
+        let second = self.second::<f32>(at.uv.into());
+        self.colors[usize::from(second)].eval(at, wavelengths)
     }
 }
 

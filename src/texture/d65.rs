@@ -6,7 +6,8 @@ use crate::color::{Color, ColorModel, Role, Spectral};
 use crate::description::declared::{Plugin, float, nested};
 use crate::description::{Kind, Properties};
 use crate::error::Result;
-use crate::interaction::Interaction;
+use crate::interaction::{Interaction, Points};
+use crate::lanes::Lanes;
 
 /// A stored spectrum, and what varies it over a surface.
 #[derive(Clone, Debug)]
@@ -58,6 +59,22 @@ impl<C: ColorModel> D65<C> {
             light: palette.store(properties, "color", &color, palette.role)?,
             texture,
         })
+    }
+}
+
+impl<C: ColorModel> D65<C> {
+    /// The values at points.
+    #[inline(always)]
+    pub(super) fn eval_lanes<F: Lanes>(
+        &self,
+        at: &Points<'_, F>,
+        wavelengths: &[C::Wavelengths],
+    ) -> C::Columns<F> {
+        let light = C::evaluate_lanes(&self.light, wavelengths);
+        match &self.texture {
+            Some(texture) => light * texture.eval_lanes(at, wavelengths),
+            None => light,
+        }
     }
 }
 

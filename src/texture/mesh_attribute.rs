@@ -83,7 +83,7 @@ impl<C: ColorModel> Pattern<C> for MeshAttribute<C> {
         } else {
             self.role
         };
-        C::evaluate_texel(&self.color.texel(rgb, role), wavelengths) * self.scale
+        self.color.evaluate_rgb(rgb, role, wavelengths) * self.scale
     }
 }
 

@@ -18,7 +18,7 @@ use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 
-use glam::{Mat3, Vec2, Vec3};
+use glam::{Mat3, Vec3};
 
 use crate::color::{Color, ColorModel, Mono, Rgb, Role, Spectra, Spectral};
 use crate::description::declared::{Preset, Row, transform};
@@ -26,7 +26,7 @@ use crate::description::{Kind, Properties, Property, Spectrum, Value};
 use crate::error::{Error, Problem, Result};
 use crate::family::family;
 use crate::interaction::{Interaction, Points};
-use crate::lanes::{Call, Lanes, MAX_LANES, Mask as _};
+use crate::lanes::{self, Call, Lanes, MAX_LANES, Mask as _};
 
 use bitmap::Texels;
 
@@ -100,21 +100,34 @@ struct LookUp<'a, C: ColorModel, F: Lanes> {
 impl<C: ColorModel, F: Lanes> Call<F> for LookUp<'_, C, F> {
     type Output = C::Columns<F>;
 
-    /// The values of lanes that are there, one by one.
     #[inline(always)]
     fn run(self) -> C::Columns<F> {
-        let (there, uv) = (self.at.active.to_bits(), self.at.uv.rows());
-        Spectra::from_samples(|lane| {
-            if there >> lane & 1 == 0 {
-                return C::Sample::zero();
-            }
-            let (at, w) = (self.at.texture_point(lane, &uv), &self.wavelengths[lane]);
-            match self.texture {
-                Texture::Bitmap(bitmap) => bitmap.eval(&at, w),
-                other => other.eval(&at, w),
-            }
-        })
+        let Self {
+            texture,
+            at,
+            wavelengths,
+        } = self;
+        match texture {
+            Texture::Bitmap(bitmap) => bitmap.eval_lanes(at.uv, wavelengths),
+            Texture::Checkerboard(board) => board.eval_lanes(at, wavelengths),
+            Texture::D65(light) => light.eval_lanes(at, wavelengths),
+            other => eval_each(other, at, wavelengths),
+        }
     }
+}
+
+/// The values of a texture that is asked lane by lane.
+#[inline(always)]
+fn eval_each<C: ColorModel, F: Lanes>(
+    texture: &Texture<C>,
+    at: &Points<'_, F>,
+    wavelengths: &[C::Wavelengths],
+) -> C::Columns<F> {
+    let (there, uv) = (at.active.to_bits(), at.uv.rows());
+    Spectra::from_samples(|lane| match there >> lane & 1 {
+        0 => C::Sample::zero(),
+        _ => texture.eval(&at.texture_point(lane, &uv), &wavelengths[lane]),
+    })
 }
 
 impl Texture<Mono> {
@@ -363,8 +376,10 @@ fn to_uv(properties: &Properties<'_>) -> Result<Mat3> {
 }
 
 /// Texture coordinates after `to_uv`.
-fn transformed(to_uv: &Mat3, uv: Vec2) -> Vec2 {
-    (*to_uv * uv.extend(1.0)).truncate()
+#[inline(always)]
+fn transformed<F: Lanes>(to_uv: &Mat3, uv: lanes::Vec2<F>) -> lanes::Vec2<F> {
+    let all = |axis: Vec3| lanes::Vec2::all(axis.truncate());
+    all(to_uv.x_axis) * uv.x + all(to_uv.y_axis) * uv.y + all(to_uv.z_axis)
 }
 
 #[cfg(test)]

@@ -3,17 +3,17 @@
 
 use std::path::Path;
 
-use crate::color::srgb;
+use crate::color::{Pixels, srgb};
 use crate::error::{Error, Location, Result};
 use crate::image::{self, Encoding, Image, Limits};
 
 /// The colours of an image file.
 #[derive(Debug)]
 pub struct Picture {
-    image: Image,
-    /// Where red, green and blue stand among the channels.
-    rgb: [usize; 3],
-    encoded: bool,
+    /// Columns and rows.
+    pub size: [usize; 2],
+    /// Row by row from the top.
+    pub pixels: Pixels,
 }
 
 impl Picture {
@@ -28,41 +28,54 @@ impl Picture {
             let message = format!("no colour channels among {:?}", image.channels());
             return Err(Error::input(message).at(&Location::of_file(path)));
         };
+        let decode: fn(f32) -> f32 = match picture.encoding {
+            Encoding::Srgb if !raw => srgb::decode,
+            Encoding::Srgb | Encoding::Linear => |value| value,
+        };
+        let coded = picture.encoding == Encoding::Srgb;
+        let codes = coded.then(|| codes(&image, rgb)).flatten();
+        let finite = |value: f32| if value.is_finite() { value } else { 0.0 };
+        let linear = |value| finite(decode(value));
         Ok(Self {
-            image,
-            rgb,
-            encoded: picture.encoding != Encoding::Linear && !raw,
+            size: [image.width() as usize, image.height() as usize],
+            pixels: match codes {
+                Some(codes) => {
+                    let values = std::array::from_fn(|code| decode(of_code(code as u8)));
+                    Pixels::Codes(codes, Box::new(values))
+                }
+                None => {
+                    Pixels::Linear(colors(&image, rgb).map(|color| color.map(linear)).collect())
+                }
+            },
         })
     }
+}
 
-    /// Columns and rows.
-    pub fn size(&self) -> [usize; 2] {
-        [self.image.width() as usize, self.image.height() as usize]
-    }
+/// The values of three channels, row by row from the top.
+fn colors(image: &Image, rgb: [usize; 3]) -> impl Iterator<Item = [f32; 3]> {
+    (0..image.height()).flat_map(move |y| {
+        (0..image.width()).map(move |x| {
+            let pixel = image.pixel(x, y);
+            rgb.map(|channel| pixel[channel])
+        })
+    })
+}
 
-    /// All texels, row by row from the top.
-    pub fn texels(&self) -> impl Iterator<Item = [f32; 3]> {
-        (0..self.size()[1]).flat_map(|y| self.row(y))
-    }
+/// The value of a code of eight bits.
+fn of_code(code: u8) -> f32 {
+    f32::from(code) / 255.0
+}
 
-    /// The texels of a row, the top one being 0.
-    ///
-    /// # Panics
-    /// Below the image, as soon as a texel is taken.
-    pub fn row(&self, y: usize) -> impl Iterator<Item = [f32; 3]> {
-        let texel = move |x| {
-            let pixel = self.image.pixel(x, y as u32);
-            self.rgb.map(|c| self.decode(pixel[c]))
-        };
-        (0..self.image.width()).map(texel)
-    }
-
-    fn decode(&self, value: f32) -> f32 {
-        let value = if self.encoded {
-            srgb::decode(value)
-        } else {
-            value
-        };
-        if value.is_finite() { value } else { 0.0 }
-    }
+/// All texels as codes of eight bits, if that is what they are.
+fn codes(image: &Image, rgb: [usize; 3]) -> Option<Vec<u32>> {
+    let code = |value: f32| {
+        let code = (value * 255.0).round() as u8;
+        (of_code(code) == value).then_some(code)
+    };
+    colors(image, rgb)
+        .map(|color| {
+            let [r, g, b] = color.map(code);
+            Some(u32::from_le_bytes([r?, g?, b?, 0]))
+        })
+        .collect()
 }

@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use glam::Vec2;
+
 use super::*;
 use crate::color::Bands;
 use crate::description::{Description, Options};

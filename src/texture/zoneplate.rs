@@ -52,7 +52,7 @@ impl<C: ColorModel> ZonePlate<C> {
 
     /// The phase in periods, and where it is, from the middle of the tile.
     fn phase(&self, uv: Vec2) -> (f32, Vec2) {
-        let uv = transformed(&self.to_uv, uv);
+        let uv = Vec2::from(transformed::<f32>(&self.to_uv, uv.into()));
         let from_middle = uv - uv.floor() - 0.5;
         let turns = 4.0 * self.rings * from_middle.length_squared();
         (turns - turns.floor(), from_middle)

@@ -20,6 +20,7 @@ const LAYERS: &[&[&str]] = &[
     &["accel", "light", "material"],
     &["scene"],
     &["integrator"],
+    &["film"],
     &["render"],
     &["crosscheck", "profile"],
 ];

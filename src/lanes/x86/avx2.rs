@@ -9,8 +9,8 @@
 use std::arch::x86_64::*;
 use std::ops::{Neg, Not};
 
-use super::operators;
-use crate::lanes::{Call, Doubles, Ints, Lanes, Mask, Task};
+use super::{operators, sum_of_eight};
+use crate::lanes::{Call, Doubles, Ints, Lanes, MAX_LANES, Mask, Task, last_of};
 
 /// Does `task` over eight lanes.
 ///
@@ -129,6 +129,29 @@ impl Lanes for F32x8 {
         unsafe { _mm256_storeu_ps(row.as_mut_ptr(), self.0) }
     }
     #[inline(always)]
+    fn from_slice(values: &[f32]) -> Self {
+        let values = &values[..8];
+        // SAFETY: see the module; there are as many numbers.
+        unsafe { Self(_mm256_loadu_ps(values.as_ptr())) }
+    }
+    #[inline(always)]
+    fn store_to(self, values: &mut [f32]) {
+        let values = &mut values[..8];
+        // SAFETY: see the module; there are as many numbers.
+        unsafe { _mm256_storeu_ps(values.as_mut_ptr(), self.0) }
+    }
+    #[inline(always)]
+    fn sum(parts: &[Self; MAX_LANES]) -> f32 {
+        // SAFETY: see the module.
+        unsafe { sum_of_eight(_mm256_add_ps(parts[0].0, parts[1].0)) }
+    }
+    #[inline(always)]
+    fn gather(table: &[f32], index: U32x8) -> Self {
+        let index = index.min(U32x8::splat(last_of(table)));
+        // SAFETY: see the module; no index is beyond the table, or read as one below 0.
+        unsafe { Self(_mm256_i32gather_ps::<4>(table.as_ptr(), index.0)) }
+    }
+    #[inline(always)]
     fn lane(self, lane: usize) -> f32 {
         let mut row = Self::ROW;
         self.store(&mut row);
@@ -212,6 +235,7 @@ impl Lanes for F32x8 {
 
 impl Ints for U32x8 {
     type Row = [u32; 8];
+    const ROW: [u32; 8] = [0; 8];
     type Float = F32x8;
     type Mask = M8;
 
@@ -229,6 +253,22 @@ impl Ints for U32x8 {
     fn store(self, row: &mut [u32; 8]) {
         // SAFETY: see the module; a row has eight integers.
         unsafe { _mm256_storeu_si256(row.as_mut_ptr().cast(), self.0) }
+    }
+    #[inline(always)]
+    fn gather(table: &[u32], index: Self) -> Self {
+        let index = index.min(Self::splat(last_of(table)));
+        // SAFETY: see the module; no index is beyond the table, or read as one below 0.
+        unsafe { Self(_mm256_i32gather_epi32::<4>(table.as_ptr().cast(), index.0)) }
+    }
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        // SAFETY: see the module.
+        unsafe { Self(_mm256_min_epu32(self.0, other.0)) }
+    }
+    #[inline(always)]
+    fn select(mask: M8, yes: Self, no: Self) -> Self {
+        // SAFETY: see the module.
+        unsafe { Self(_mm256_blendv_epi8(no.0, yes.0, _mm256_castps_si256(mask.0))) }
     }
     #[inline(always)]
     fn shl<const N: u32>(self) -> Self {

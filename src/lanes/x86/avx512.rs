@@ -8,8 +8,8 @@
 use std::arch::x86_64::*;
 use std::ops::{BitAnd, BitOr, BitXor, Neg, Not};
 
-use super::operators;
-use crate::lanes::{Call, Doubles, Ints, Lanes, Mask, Task};
+use super::{operators, sum_of_eight};
+use crate::lanes::{Call, Doubles, Ints, Lanes, MAX_LANES, Mask, Task, last_of};
 
 /// Does `task` over sixteen lanes.
 ///
@@ -142,6 +142,33 @@ impl Lanes for F32x16 {
         unsafe { _mm512_storeu_ps(row.as_mut_ptr(), self.0) }
     }
     #[inline(always)]
+    fn from_slice(values: &[f32]) -> Self {
+        let values = &values[..16];
+        // SAFETY: see the module; there are as many numbers.
+        unsafe { Self(_mm512_loadu_ps(values.as_ptr())) }
+    }
+    #[inline(always)]
+    fn store_to(self, values: &mut [f32]) {
+        let values = &mut values[..16];
+        // SAFETY: see the module; there are as many numbers.
+        unsafe { _mm512_storeu_ps(values.as_mut_ptr(), self.0) }
+    }
+    #[inline(always)]
+    fn sum(parts: &[Self; MAX_LANES]) -> f32 {
+        // SAFETY: see the module.
+        unsafe {
+            let all = parts[0].0;
+            let high = _mm512_extractf32x8_ps::<1>(all);
+            sum_of_eight(_mm256_add_ps(_mm512_castps512_ps256(all), high))
+        }
+    }
+    #[inline(always)]
+    fn gather(table: &[f32], index: U32x16) -> Self {
+        let index = index.min(U32x16::splat(last_of(table)));
+        // SAFETY: see the module; no index is beyond the table, or read as one below 0.
+        unsafe { Self(_mm512_i32gather_ps::<4>(index.0, table.as_ptr())) }
+    }
+    #[inline(always)]
     fn lane(self, lane: usize) -> f32 {
         let mut row = Self::ROW;
         self.store(&mut row);
@@ -229,6 +256,7 @@ impl Lanes for F32x16 {
 
 impl Ints for U32x16 {
     type Row = [u32; 16];
+    const ROW: [u32; 16] = [0; 16];
     type Float = F32x16;
     type Mask = M16;
 
@@ -246,6 +274,22 @@ impl Ints for U32x16 {
     fn store(self, row: &mut [u32; 16]) {
         // SAFETY: see the module; a row has sixteen integers.
         unsafe { _mm512_storeu_si512(row.as_mut_ptr().cast(), self.0) }
+    }
+    #[inline(always)]
+    fn gather(table: &[u32], index: Self) -> Self {
+        let index = index.min(Self::splat(last_of(table)));
+        // SAFETY: see the module; no index is beyond the table, or read as one below 0.
+        unsafe { Self(_mm512_i32gather_epi32::<4>(index.0, table.as_ptr().cast())) }
+    }
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        // SAFETY: see the module.
+        unsafe { Self(_mm512_min_epu32(self.0, other.0)) }
+    }
+    #[inline(always)]
+    fn select(mask: M16, yes: Self, no: Self) -> Self {
+        // SAFETY: see the module.
+        unsafe { Self(_mm512_mask_blend_epi32(mask.0, no.0, yes.0)) }
     }
     #[inline(always)]
     fn shl<const N: u32>(self) -> Self {

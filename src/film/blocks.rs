@@ -5,12 +5,12 @@
 //! beyond the block as far as the filter does, and is divided by its number of samples when the film is
 //! put together. Blocks are aligned to the full film: a crop takes whole ones.
 
-use super::sums::{Accumulator, Sums, Tally, zeros};
+use super::{Accumulator, Layout, Sums, Tally, zeros};
 use crate::error::Result;
 use crate::sensor::{Film, Window};
 
 /// Pixels along a block's side.
-pub(super) const BLOCK: u32 = 8;
+pub(crate) const BLOCK: u32 = 8;
 /// Blocks along the side of a tile, which is a unit of work.
 const TILE: u32 = 4;
 /// Numbers in front of a record's sums: samples of each pixel, and the step of the budget's ladder.
@@ -18,7 +18,7 @@ const HEAD: usize = 2;
 
 /// Where the blocks are.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Grid {
+pub(crate) struct Grid {
     /// All that can be sampled.
     film: Window,
     /// The blocks that the crop touches.
@@ -32,7 +32,7 @@ pub(super) struct Grid {
 
 impl Grid {
     /// For sums of so many channels.
-    pub(super) fn new(film: &Film, channels: usize) -> Self {
+    pub(crate) fn new(film: &Film, channels: usize) -> Self {
         let (full, border) = (film.sampled(), film.filter.reach());
         let shown = whole_blocks(&film.shown(), &full);
         Self {
@@ -50,18 +50,18 @@ impl Grid {
     }
 
     /// How many blocks there are.
-    pub(super) fn blocks(&self) -> usize {
+    pub(crate) fn blocks(&self) -> usize {
         self.size().map(|n| n as usize).iter().product()
     }
 
     /// How many tiles there are.
-    pub(super) fn tiles(&self) -> usize {
+    pub(crate) fn tiles(&self) -> usize {
         let along = |n: u32| n.div_ceil(TILE) as usize;
         self.size().map(along).iter().product()
     }
 
     /// A tile's blocks.
-    pub(super) fn tile(&self, tile: usize) -> impl Iterator<Item = usize> + use<> {
+    pub(crate) fn tile(&self, tile: usize) -> impl Iterator<Item = usize> + use<> {
         let [across, down] = self.size();
         let tiles_across = across.div_ceil(TILE);
         let (x, y) = (tile as u32 % tiles_across, tile as u32 / tiles_across);
@@ -70,7 +70,7 @@ impl Grid {
     }
 
     /// A block's own pixels.
-    pub(super) fn block(&self, block: usize) -> Window {
+    pub(crate) fn block(&self, block: usize) -> Window {
         let across = self.size()[0];
         let (x, y) = (block as u32 % across, block as u32 / across);
         let block = Window {
@@ -83,7 +83,7 @@ impl Grid {
     }
 
     /// The pixels that a block's samples reach.
-    pub(super) fn reach(&self, block: usize) -> Window {
+    pub(crate) fn reach(&self, block: usize) -> Window {
         self.block(block).grown(self.border, &self.film)
     }
 
@@ -94,7 +94,7 @@ impl Grid {
     }
 
     /// Bytes that all blocks take.
-    pub(super) fn bytes(&self) -> u64 {
+    pub(crate) fn bytes(&self) -> u64 {
         16 * self.blocks() as u64 * self.record() as u64
     }
 }
@@ -114,15 +114,15 @@ fn whole_blocks(window: &Window, film: &Window) -> Window {
 
 /// What the samples of one half of one block add up to.
 #[derive(Clone, Debug)]
-pub(super) struct Record {
+pub(crate) struct Record {
     /// Twice the block's number, and one more for the second half.
-    pub(super) slot: usize,
+    pub(crate) slot: usize,
     numbers: Vec<f64>,
 }
 
 impl Record {
     /// No samples yet.
-    pub(super) fn new(grid: &Grid, slot: usize) -> Self {
+    pub(crate) fn new(grid: &Grid, slot: usize) -> Self {
         Self {
             slot,
             numbers: vec![0.0; grid.record()],
@@ -130,24 +130,24 @@ impl Record {
     }
 
     /// Samples of each pixel.
-    pub(super) fn samples_mut(&mut self) -> &mut f64 {
+    pub(crate) fn samples_mut(&mut self) -> &mut f64 {
         &mut self.numbers[0]
     }
 
     /// The step of the budget's ladder that the half takes.
-    pub(super) fn step_mut(&mut self) -> &mut f64 {
+    pub(crate) fn step_mut(&mut self) -> &mut f64 {
         &mut self.numbers[1]
     }
 
     /// The sums over [`Grid::reach`].
-    pub(super) fn sums_mut(&mut self) -> &mut [f64] {
+    pub(crate) fn sums_mut(&mut self) -> &mut [f64] {
         &mut self.numbers[HEAD..]
     }
 }
 
 /// All records.
 #[derive(Debug)]
-pub(super) struct Blocks {
+pub(crate) struct Blocks {
     grid: Grid,
     numbers: Vec<f64>,
     tally: Tally,
@@ -183,7 +183,7 @@ impl Accumulator for Blocks {
 
 impl Blocks {
     /// No samples yet; fails where the memory is not there.
-    pub(super) fn new(grid: Grid) -> Result<Self> {
+    pub(crate) fn new(grid: Grid) -> Result<Self> {
         Ok(Self {
             numbers: zeros(2 * grid.blocks() * grid.record(), &grid.pixels)?,
             grid,
@@ -197,21 +197,21 @@ impl Blocks {
     }
 
     /// Each block's own pixels, and how many samples of both halves each of them has.
-    pub(super) fn counts(&self) -> impl Iterator<Item = (Window, u32)> {
+    pub(crate) fn counts(&self) -> impl Iterator<Item = (Window, u32)> {
         let samples = |block| self.record(2 * block)[0] + self.record(2 * block + 1)[0];
         (0..self.grid.blocks()).map(move |block| (self.grid.block(block), samples(block) as u32))
     }
 
     /// The step of the ladder that each half of each block takes.
-    pub(super) fn steps(&self) -> Vec<usize> {
+    pub(crate) fn steps(&self) -> Vec<usize> {
         (0..2 * self.grid.blocks())
             .map(|slot| self.record(slot)[1] as usize)
             .collect()
     }
 
     /// The film by each half, over the blocks that are shown.
-    pub(super) fn halves(&self, channels: &[String]) -> Result<[Sums; 2]> {
-        let film = || Sums::new(self.grid.shown, channels.to_vec());
+    pub(crate) fn halves(&self, layout: &Layout) -> Result<[Sums; 2]> {
+        let film = || Sums::new(self.grid.shown, layout.clone());
         let mut halves = [film()?, film()?];
         for (half, film) in halves.iter_mut().enumerate() {
             for block in 0..self.grid.blocks() {

@@ -1,0 +1,56 @@
+//! What the channels of a sample are, in their order.
+
+use std::ops::Range;
+
+/// Names of a sample's channels: red, green and blue, other colours of the colour model, what the integrator adds, and
+/// opacity.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Layout {
+    names: Vec<String>,
+    /// How many are colours.
+    colors: usize,
+}
+
+impl Layout {
+    /// The first three of `colors` are red, green and blue.
+    pub(crate) fn new(colors: Vec<String>, extra: Vec<String>) -> Self {
+        let count = colors.len();
+        let mut names = colors;
+        names.extend(extra);
+        names.push("A".into());
+        Self {
+            names,
+            colors: count,
+        }
+    }
+
+    /// How many channels there are.
+    pub(crate) fn count(&self) -> usize {
+        self.names.len()
+    }
+
+    /// Where the colours are.
+    pub(crate) fn colors(&self) -> Range<usize> {
+        0..self.colors
+    }
+
+    /// Where the channels are that the integrator adds.
+    pub(crate) fn extra(&self) -> Range<usize> {
+        self.colors..self.opacity()
+    }
+
+    /// Where opacity is.
+    pub(crate) fn opacity(&self) -> usize {
+        self.names.len() - 1
+    }
+
+    /// Where the channels are that an image has beside red, green, blue and opacity.
+    pub(crate) fn others(&self) -> Range<usize> {
+        3..self.opacity()
+    }
+
+    /// The channels' names.
+    pub(crate) fn names(&self) -> &[String] {
+        &self.names
+    }
+}

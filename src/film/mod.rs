@@ -1,0 +1,14 @@
+//! The film: what a sample's channels are, and sums of samples by filter weight, over rectangles of pixels or apart by
+//! block.
+
+mod blocks;
+mod layout;
+mod splat;
+mod sums;
+
+pub(crate) use blocks::{BLOCK, Blocks, Grid, Record};
+pub(crate) use layout::Layout;
+pub(crate) use splat::{GROUP, Group};
+pub(crate) use sums::{Accumulator, Summed, Sums, Tally, Times};
+
+use sums::zeros;
