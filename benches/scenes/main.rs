@@ -3,14 +3,20 @@
 //!     cargo bench --bench scenes                                     # the scenes of ../shared/data/scenes
 //!     cargo bench --bench scenes -- veach-mis --rounds 9             # only these, more rounds
 //!     cargo bench --bench scenes -- my/scene.xml --size 400x225      # any scene
+//!     cargo bench --bench scenes -- --reference 4096 --size 160x90  # CPU time at equal error, against so many samples
 //!     DRJIT_LIBLLVM_PATH=/usr/lib/x86_64-linux-gnu/libLLVM.so.19.1 cargo bench --bench scenes
 //!
 //! `ETENDUE_PYTHON` or --python names a Python that has Mitsuba (tools/venv makes one). Both sides load a scene once and
 //! render it a first time, which is not measured. Then they take turns in each round, so that what disturbs the machine
 //! disturbs all alike; a ratio is the median over the rounds, and beside it stand the least and the greatest. Integrator and
 //! sampler are the scene's own. What is measured is the CPU time of the render call, of all threads.
+//!
+//! With `--reference` each side also renders with the sampler that is best for it, and what is compared is CPU time times
+//! error: the mean of (x − r)²/(r² + 0.01) over pixels and channels, against an image r by Mitsuba.
 
 #![allow(clippy::print_stdout, clippy::print_stderr)] // a bench's business
+
+mod error;
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
@@ -19,6 +25,7 @@ use std::process::{Child, ChildStdin, ChildStdout, Command, ExitCode, Stdio};
 use clap::Parser;
 use etendue::crosscheck::find_python;
 use etendue::description::{self, Description};
+use etendue::image::Image;
 use etendue::render::{Options, Overrides, Session, Silent};
 use rustix::time::{ClockId, clock_gettime};
 
@@ -39,6 +46,9 @@ struct Arguments {
     /// The variants of Mitsuba to render beside.
     #[arg(long, value_delimiter = ',', default_value = "llvm_ad_rgb,scalar_rgb")]
     variants: Vec<String>,
+    /// Compare CPU time at equal error, against a reference of so many samples per pixel.
+    #[arg(long, value_name = "SPP")]
+    reference: Option<u32>,
     /// A Python that has Mitsuba.
     #[arg(long)]
     python: Option<PathBuf>,
@@ -78,25 +88,31 @@ fn run(arguments: &Arguments) -> Result<(), String> {
         size.0, size.1, arguments.spp, arguments.rounds
     );
     let scenes = scenes(&arguments.scenes)?;
+    if let Some(reference) = arguments.reference {
+        let together = |(name, path): &(String, PathBuf)| {
+            error::compare(arguments, name, path, size, reference)
+        };
+        return scenes.iter().try_for_each(together);
+    }
     let mut logarithms = vec![0.0; arguments.variants.len()];
     for (name, path) in &scenes {
-        let mut ours = Ours::load(path, size, arguments.spp)?;
+        let mut ours = Ours::load(path, size, arguments.spp, None)?;
         let variants = arguments.variants.iter();
         let theirs: Result<Vec<Theirs>, String> = variants
-            .map(|variant| Theirs::load(arguments, variant, path, size))
+            .map(|variant| Theirs::load(arguments, variant, path, (size, arguments.spp), None))
             .collect();
         let mut theirs = theirs?;
         let mut own = Vec::new();
         let mut others = vec![Vec::new(); theirs.len()];
         let mut stages = [0.0; 4];
         for round in 0..arguments.rounds {
-            let (cpu, seconds) = ours.render(round as u64 + 1)?;
+            let (cpu, seconds, _) = ours.render(round as u64 + 1)?;
             own.push(cpu / samples * 1e9);
             for (sum, seconds) in stages.iter_mut().zip(seconds) {
                 *sum += seconds / samples * 1e9 / arguments.rounds as f64;
             }
             for (other, times) in theirs.iter_mut().zip(&mut others) {
-                times.push(other.render()? / samples * 1e9);
+                times.push(other.render(round as u64 + 1, None)? / samples * 1e9);
             }
         }
         let [closest, occluded, shade, film] = stages;
@@ -162,12 +178,18 @@ struct Ours {
 }
 
 impl Ours {
-    fn load(path: &Path, size: (u32, u32), spp: u32) -> Result<Self, String> {
+    fn load(
+        path: &Path,
+        size: (u32, u32),
+        spp: u32,
+        sampler: Option<&str>,
+    ) -> Result<Self, String> {
         let read = Description::read(path, &description::Options::default());
         let mut description = read.map_err(|e| e.to_string())?;
         let overrides = Overrides {
             spp: Some(spp),
             size: Some(size),
+            sampler: sampler.map(str::to_owned),
             ..Overrides::default()
         };
         overrides.apply(&mut description);
@@ -179,8 +201,8 @@ impl Ours {
         Ok(ours)
     }
 
-    /// Seconds of CPU time, and of threads by stage.
-    fn render(&mut self, seed: u64) -> Result<(f64, [f64; 4]), String> {
+    /// Seconds of CPU time, and of threads by stage; and the image.
+    fn render(&mut self, seed: u64) -> Result<(f64, [f64; 4], Image), String> {
         let options = Options {
             seed,
             ..Options::default()
@@ -188,14 +210,15 @@ impl Ours {
         let start = cpu();
         let rendered = self.session.render(&self.description, &options, &Silent);
         let took = cpu() - start;
-        let seconds = rendered.map_err(|e| e.to_string())?.report.seconds;
+        let rendered = rendered.map_err(|e| e.to_string())?;
+        let seconds = rendered.report.seconds;
         let stages = [
             seconds.closest,
             seconds.occluded,
             seconds.shade,
             seconds.film,
         ];
-        Ok((took, stages))
+        Ok((took, stages, rendered.image))
     }
 }
 
@@ -211,13 +234,15 @@ impl Theirs {
         arguments: &Arguments,
         variant: &str,
         path: &Path,
-        (width, height): (u32, u32),
+        ((width, height), spp): ((u32, u32), u32),
+        sampler: Option<&str>,
     ) -> Result<Self, String> {
         let python = find_python(arguments.python.as_deref()).map_err(|e| e.to_string())?;
         let mut process = Command::new(&python.path)
             .args(["-c", include_str!("mitsuba.py"), variant])
             .arg(path)
-            .args([width, height, arguments.spp].map(|n| n.to_string()))
+            .args([width, height, spp].map(|n| n.to_string()))
+            .arg(sampler.unwrap_or_default())
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .spawn()
@@ -243,9 +268,10 @@ impl Theirs {
         Ok(line)
     }
 
-    /// Seconds of CPU time.
-    fn render(&mut self) -> Result<f64, String> {
-        writeln!(self.input).map_err(|e| e.to_string())?;
+    /// Seconds of CPU time; the image goes to a file, if one is given.
+    fn render(&mut self, seed: u64, image: Option<&Path>) -> Result<f64, String> {
+        let image = image.unwrap_or(Path::new("")).display();
+        writeln!(self.input, "{seed} {image}").map_err(|e| e.to_string())?;
         let line = self.line()?;
         let parsed = line.trim().parse();
         parsed.map_err(|_| format!("Mitsuba ended: {:?}", self.process.try_wait()))

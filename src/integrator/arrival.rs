@@ -89,12 +89,6 @@ impl<C: ColorModel> Arrival<'_, '_, C> {
     }
 }
 
-/// The opacity of a path that has met nothing yet.
-pub(super) fn opacity_at_start<C: ColorModel>(scene: &Scene<C>, hide_emitters: bool) -> f32 {
-    let surrounded = scene.has_environment() && !hide_emitters;
-    if surrounded { 1.0 } else { 0.0 }
-}
-
 /// Takes camera rays on to what lies behind surfaces that give light.
 pub(super) fn look_through_emitters<C: ColorModel>(
     scene: &Scene<C>,

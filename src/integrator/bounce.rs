@@ -26,22 +26,6 @@ impl Bounces {
         first.checked_add(size)?;
         Some(first)
     }
-
-    /// Goes on to the numbers of the bounce at `depth`; `None` where the path has used up all that there are.
-    #[inline]
-    pub(super) fn begin(&self, stream: &mut Stream, depth: u32) -> Option<()> {
-        stream.seek(self.first(depth)?);
-        Some(())
-    }
-}
-
-/// The numbers of a decision.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Decision {
-    /// For a point or a direction.
-    pub(super) u2: Vec2,
-    /// For which light or lobe.
-    pub(super) u1: f32,
 }
 
 /// The numbers of a decision of paths in lanes.
@@ -69,7 +53,7 @@ impl<'a> Decisions<'a> {
         }
     }
 
-    /// [`Decision::u2`].
+    /// For a point or a direction.
     #[inline(always)]
     pub(super) fn u2<F: Lanes>(&self) -> lanes::Vec2<F> {
         let mut pairs = [Vec2::ZERO; MAX_LANES];
@@ -82,7 +66,7 @@ impl<'a> Decisions<'a> {
         lanes::Vec2::<F>::load(&rows)
     }
 
-    /// [`Decision::u1`].
+    /// For which light or lobe.
     #[inline(always)]
     pub(super) fn u1<F: Lanes>(&self) -> F {
         self.number(2)
@@ -105,17 +89,5 @@ impl<'a> Decisions<'a> {
             row[lane] = *number;
         }
         F::load(&row)
-    }
-}
-
-impl Decision {
-    /// The next one of the bounce; the number for whether the path goes on is the stream's next.
-    #[inline]
-    pub(super) fn next(stream: &mut Stream, sampler: &Sampler) -> Self {
-        stream.align(DIMENSIONS);
-        Self {
-            u2: stream.next_2d(sampler),
-            u1: stream.next_1d(sampler),
-        }
     }
 }

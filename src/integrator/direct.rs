@@ -3,16 +3,16 @@
 //! sampling. Equal to `path` at `max_depth` 2 in the mean. Whatever the camera meets is opaque, surroundings are not.
 //! `hide_emitters`: see [`super::limits`].
 
-use super::arrival::{Arrival, Scattered, look_through_emitters};
-use super::bounce::{Bounces, Decision};
+use super::bounce::Bounces;
 use super::limits;
 use super::mis::power;
+use super::wave::{Block, Outcome, Shading, Wave, Ways};
 use super::{Context, Cost, Estimate, Estimates, Estimator, Start};
-use crate::color::{ColorModel, Spectral};
+use crate::color::{ColorModel, Spectra as _, Spectral as _};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, integer};
 use crate::error::Result;
-use crate::interaction::Ray;
+use crate::lanes::{Lanes, MAX_LANES, Mask as _};
 use crate::sampler::Sampler;
 use crate::scene::Scene;
 
@@ -24,16 +24,15 @@ pub struct Direct {
     hide_emitters: bool,
 }
 
-/// A sample of the light or of the material, still to be traced.
+/// A light sample whose visibility is still to be asked.
 #[derive(Clone, Copy, Debug)]
-struct Probe<S> {
-    ray: Ray,
-    /// What light found there is multiplied by; of a light sample, the light itself is in it.
-    factor: S,
+struct Shadow<S> {
+    contribution: S,
     slot: u32,
-    /// For a material's sample, unless that is a delta.
-    scattered: Option<Scattered>,
 }
+
+/// About how many samples of a kind are in memory at once.
+const SAMPLES: usize = 1 << 14;
 
 /// The most samples of a kind.
 const MAX_SAMPLES: f64 = 4096.0;
@@ -88,9 +87,10 @@ impl Direct {
         })
     }
 
-    /// The share of samples of a kind in both.
-    fn share(&self, samples: u32) -> f32 {
-        samples as f32 / (self.emitter_samples + self.bsdf_samples) as f32
+    /// The shares of the samples of lights and of the material in both.
+    fn shares(&self) -> [f32; 2] {
+        let both = (self.emitter_samples + self.bsdf_samples) as f32;
+        [self.emitter_samples, self.bsdf_samples].map(|samples| samples as f32 / both)
     }
 }
 
@@ -103,127 +103,125 @@ impl<C: ColorModel> Estimator<C> for Direct {
         estimates: &mut Estimates<C::Sample>,
         cost: &mut Cost,
     ) {
-        let estimates = &mut estimates.values;
-        estimates.clear();
-        let (light_share, bsdf_share) = (
-            self.share(self.emitter_samples),
-            self.share(self.bsdf_samples),
-        );
-        let (mut rays, mut hits): (Vec<Ray>, _) =
-            (starts.iter().map(|s| s.ray).collect(), Vec::new());
-        cost.closest(scene, 0, &rays, &mut hits);
-
-        if self.hide_emitters {
-            look_through_emitters(scene, &mut rays, &mut hits, cost);
+        let nothing = Estimate {
+            radiance: C::Sample::zero(),
+            alpha: 0.0,
+        };
+        estimates.values.clear();
+        estimates.values.resize(starts.len(), nothing);
+        let most = self.emitter_samples.max(self.bsdf_samples) as usize;
+        let together = (SAMPLES / most).max(MAX_LANES);
+        let parts = starts.chunks(together);
+        for (starts, estimates) in parts.zip(estimates.values.chunks_mut(together)) {
+            self.estimate_part(Wave::new(scene, sampler, starts), estimates, cost);
         }
+    }
+}
 
+impl Direct {
+    fn estimate_part<C: ColorModel>(
+        &self,
+        mut wave: Wave<'_, C, Shadow<C::Sample>>,
+        estimates: &mut [Estimate<C::Sample>],
+        cost: &mut Cost,
+    ) {
+        wave.trace(0, self.hide_emitters, cost);
+        for (slot, met) in wave.met() {
+            estimates[slot].alpha = if met { 1.0 } else { 0.0 };
+        }
+        wave.arrive(|slot, mut arrival| {
+            arrival.hides_surroundings = self.hide_emitters;
+            arrival.add_to(&mut estimates[slot]);
+        });
         let bounces = Bounces {
             decisions: self.emitter_samples + self.bsdf_samples,
         };
-        let mut shadows: Vec<Probe<C::Sample>> = Vec::new();
-        let mut probes: Vec<Probe<C::Sample>> = Vec::new();
-        for (slot, ((start, ray), hit)) in starts.iter().zip(&rays).zip(&hits).enumerate() {
-            let (w, slot) = (&start.wavelengths, slot as u32);
-            let at = (!hit.is_miss()).then(|| scene.interaction(ray, hit));
-            let mut estimate = Estimate {
-                radiance: C::Sample::zero(),
-                alpha: if at.is_some() { 1.0 } else { 0.0 },
-            };
-            let arrival = Arrival {
-                scene,
-                ray,
-                at: at.as_ref(),
-                wavelengths: w,
-                throughput: scene.color().unit(),
-                scattered: None,
-                hides_surroundings: self.hide_emitters,
-            };
-            arrival.add_to(&mut estimate);
-            estimates.push(estimate);
-            let Some(at) = at else { continue };
-            cost.stats.shaded += 1;
-            let material = scene.material(&at);
-            let mut stream = start.stream;
-            if bounces.begin(&mut stream, 0).is_none() {
-                continue;
-            }
-            for _ in 0..self.emitter_samples {
-                let Decision { u2, u1 } = Decision::next(&mut stream, sampler);
-                let Some(light) = scene.sample_light(at.position, u1, u2, w) else {
-                    continue;
-                };
-                let Some(value) = material.eval(&at, at.wi, at.frame.to_local(light.direction), w)
-                else {
-                    continue;
-                };
-                let other = if light.delta {
-                    0.0
-                } else {
-                    value.pdf * bsdf_share
-                };
-                let weight = power(light.pdf * light_share, other)
-                    / (light.pdf * self.emitter_samples as f32);
-                let factor = scene.color().unit() * value.value * light.radiance * weight;
-                if !factor.is_black() {
-                    let ray = light
-                        .target
-                        .map_or_else(|| at.spawn(light.direction), |target| at.spawn_to(target));
-                    shadows.push(Probe {
-                        ray,
-                        factor,
-                        slot,
-                        scattered: None,
-                    });
-                }
-            }
-            for _ in 0..self.bsdf_samples {
-                let Decision { u2, u1 } = Decision::next(&mut stream, sampler);
-                let Some(sample) = material.sample(&at, at.wi, u1, u2, w) else {
-                    continue;
-                };
-                let factor = scene.color().unit() * sample.weight / self.bsdf_samples as f32;
-                let ray = at.spawn(at.frame.to_world(sample.wo));
-                let scattered = (!sample.delta).then_some(Scattered {
-                    from: at.position,
-                    pdf: sample.pdf * bsdf_share,
-                    light_share,
-                });
-                probes.push(Probe {
-                    ray,
-                    factor,
-                    slot,
-                    scattered,
-                });
-            }
-        }
+        let Some(first) = bounces.first(0) else {
+            return;
+        };
+        let mut bounce = Bounce(self);
+        let light = |_: &mut Bounce<'_>, shadow: &Shadow<C::Sample>| {
+            estimates[shadow.slot as usize].radiance += shadow.contribution;
+        };
+        wave.shade(first, self.emitter_samples, &mut bounce, light, cost);
+        wave.trace(1, false, cost);
+        wave.arrive(|slot, arrival| arrival.add_to(&mut estimates[slot]));
+    }
+}
 
-        let mut blocked = Vec::new();
-        let shadow_rays: Vec<Ray> = shadows.iter().map(|s| s.ray).collect();
-        cost.occluded(scene, &shadow_rays, &mut blocked);
-        for (shadow, _) in shadows
-            .iter()
-            .zip(&blocked)
-            .filter(|(_, blocked)| !**blocked)
-        {
-            estimates[shadow.slot as usize].radiance += shadow.factor;
-        }
+/// The samples of both kinds.
+struct Bounce<'a>(&'a Direct);
 
-        rays.clear();
-        rays.extend(probes.iter().map(|p| p.ray));
-        cost.closest(scene, 1, &rays, &mut hits);
-        for (probe, hit) in probes.iter().zip(&hits) {
-            let w = &starts[probe.slot as usize].wavelengths;
-            let at = (!hit.is_miss()).then(|| scene.interaction(&probe.ray, hit));
-            let arrival = Arrival {
-                scene,
-                ray: &probe.ray,
-                at: at.as_ref(),
-                wavelengths: w,
-                throughput: probe.factor,
-                scattered: probe.scattered,
-                hides_surroundings: false,
-            };
-            arrival.add_to(&mut estimates[probe.slot as usize]);
+impl<C: ColorModel> Shading<C> for Bounce<'_> {
+    type Shadow = Shadow<C::Sample>;
+
+    #[inline(always)]
+    fn shade<F: Lanes>(&mut self, block: &Block<'_, C, F>, out: &mut Outcome<'_, C, Self::Shadow>) {
+        if block.material.is_smooth() {
+            for number in 0..self.0.emitter_samples {
+                self.light(block, number, out);
+            }
         }
+        for number in 0..self.0.bsdf_samples {
+            self.way(block, self.0.emitter_samples + number, out);
+        }
+    }
+}
+
+impl Bounce<'_> {
+    /// Draws light toward the points.
+    #[inline(always)]
+    fn light<C: ColorModel, F: Lanes>(
+        &self,
+        block: &Block<'_, C, F>,
+        decision: u32,
+        out: &mut Outcome<'_, C, Shadow<C::Sample>>,
+    ) {
+        let numbers = block.decisions(decision);
+        let (u2, u1) = (numbers.u2::<F>(), numbers.u1::<F>());
+        let (at, w) = (&block.at, block.wavelengths);
+        let light = block.scene.sample_lights(at.position, u1, u2, w, at.active);
+        let wo = at.frame.to_local(light.direction);
+        let value = block.material.eval_lanes(at, at.wi, wo, w);
+        let [light_share, bsdf_share] = self.0.shares().map(F::splat);
+        let other = F::select(light.delta, F::zero(), value.pdf * bsdf_share);
+        let count = F::splat(self.0.emitter_samples as f32);
+        let weight = power(light.pdf * light_share, other) / (light.pdf * count);
+        let contribution = block.throughput * value.value * light.radiance * weight;
+        let lit = at.active & F::zero().lt(light.pdf) & !contribution.is_black();
+        if !lit.any() {
+            return;
+        }
+        let contributions = contribution.rows();
+        out.ask(block, &light, lit, |lane| Shadow {
+            contribution: C::Columns::<F>::of(&contributions, lane),
+            slot: block.walker(lane).slot,
+        });
+    }
+
+    /// Looks for light where the material scatters to.
+    #[inline(always)]
+    fn way<C: ColorModel, F: Lanes>(
+        &self,
+        block: &Block<'_, C, F>,
+        decision: u32,
+        out: &mut Outcome<'_, C, Shadow<C::Sample>>,
+    ) {
+        let numbers = block.decisions(decision);
+        let (u2, u1) = (numbers.u2::<F>(), numbers.u1::<F>());
+        let (at, w) = (&block.at, block.wavelengths);
+        let sample = block.material.sample_lanes(at, at.wi, u1, u2, w);
+        let [light_share, bsdf_share] = self.0.shares();
+        let part = F::splat(1.0 / self.0.bsdf_samples as f32);
+        let ways = Ways {
+            lives: sample.drawn & at.active,
+            wo: sample.wo,
+            throughput: block.throughput * sample.weight * part,
+            eta: sample.eta,
+            pdf: sample.pdf * F::splat(bsdf_share),
+            delta: sample.delta,
+            light_share,
+        };
+        out.send(block, &ways);
     }
 }

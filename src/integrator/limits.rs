@@ -7,12 +7,14 @@
 //! divides its work, and have no effect here: tiles and passes are fixed, and what ends a render early is
 //! `--time-limit`, which says so.
 
+use super::Estimate;
 use super::bounce::Decisions;
-use crate::color::{Spectra, Spectral};
+use crate::color::{ColorModel, Spectra, Spectral as _};
 use crate::description::Properties;
 use crate::description::declared::{Row, boolean, float, integer};
 use crate::error::{Problem, Result};
 use crate::lanes::Lanes;
+use crate::scene::Scene;
 
 const HIDE_EMITTERS: Row = boolean(
     "hide_emitters",
@@ -91,30 +93,22 @@ impl Limits {
         })
     }
 
-    /// Roulette after the bounce at `depth`: the throughput with which a path lives on, if it does. `draw` is asked for
-    /// a number in [0, 1) where that is left to chance.
-    pub(super) fn roulette<S: Spectral>(
+    /// What a path comes to that has met nothing yet.
+    pub(super) fn start<C: ColorModel>(
         &self,
-        depth: u32,
-        throughput: S,
-        eta: f32,
-        draw: impl FnOnce() -> f32,
-    ) -> Option<S> {
-        if throughput.is_black() {
-            return None;
+        scene: &Scene<C>,
+        hide_emitters: bool,
+    ) -> Estimate<C::Sample> {
+        let surrounded = scene.has_environment() && !hide_emitters && self.max_depth > 0;
+        Estimate {
+            radiance: C::Sample::zero(),
+            alpha: if surrounded { 1.0 } else { 0.0 },
         }
-        if depth + 1 < self.rr_depth {
-            return Some(throughput);
-        }
-        let survival = (throughput.max_value() * eta * eta).min(MAX_SURVIVAL);
-        (draw() < survival).then(|| throughput / survival)
     }
-}
 
-impl Limits {
-    /// [`Limits::roulette`] of paths in lanes: the throughputs of those that live on.
+    /// Roulette after the bounce at `depth`: the paths that live on, and with which throughputs.
     #[inline(always)]
-    pub(super) fn roulettes<F: Lanes, S: Spectra<F>>(
+    pub(super) fn roulette<F: Lanes, S: Spectra<F>>(
         &self,
         depth: u32,
         throughput: S,

@@ -20,6 +20,7 @@ mod layers;
 mod limits;
 mod mis;
 mod runs;
+mod wave;
 
 use crate::color::ColorModel;
 use crate::family::family;

@@ -3,21 +3,17 @@
 //!
 //! `max_depth`, `rr_depth` and `hide_emitters`: see [`super::limits`].
 
-use super::arrival::{Arrival, Scattered, look_through_emitters, opacity_at_start};
-use super::bounce::{Bounces, Decisions};
+use super::bounce::Bounces;
 use super::limits::{self, Limits};
 use super::mis::power;
-use super::runs::Runs;
+use super::wave::{Block, Outcome, Shading, Wave, Ways};
 use super::{Context, Cost, Estimate, Estimates, Estimator, Start};
-use crate::accel::Met;
-use crate::color::{ColorModel, Spectra as _, Spectral as _};
+use crate::color::{ColorModel, Spectra as _};
 use crate::description::Properties;
 use crate::description::declared::Plugin;
 use crate::error::Result;
-use crate::interaction::{Hit, Points, Ray};
-use crate::lanes::{Lanes, MAX_LANES, Mask as _, Task, Vec3};
-use crate::material::Material;
-use crate::sampler::{Sampler, Stream};
+use crate::lanes::{Lanes, Mask as _};
+use crate::sampler::Sampler;
 use crate::scene::Scene;
 
 /// The path tracer's settings.
@@ -34,51 +30,11 @@ const LIGHT: u32 = 0;
 /// The second.
 const WAY: u32 = 1;
 
-/// A path on its way, beside its ray.
-#[derive(Clone, Copy, Debug)]
-struct Walker<C: ColorModel> {
-    throughput: C::Sample,
-    wavelengths: C::Wavelengths,
-    stream: Stream,
-    /// Index of the start, and of the estimate.
-    slot: u32,
-    /// Product of the indices of refraction passed.
-    eta: f32,
-    /// Where the ray was scattered, unless at the camera or into a delta lobe.
-    scattered: Option<Scattered>,
-}
-
-/// A light sample whose visibility is still to be asked, beside its ray.
+/// A light sample whose visibility is still to be asked.
 #[derive(Clone, Copy, Debug)]
 struct Shadow<S> {
     contribution: S,
     slot: u32,
-}
-
-/// Things with a ray each.
-#[derive(Debug)]
-struct WithRays<T> {
-    rays: Vec<Ray>,
-    things: Vec<T>,
-}
-
-impl<T> WithRays<T> {
-    fn with_capacity(count: usize) -> Self {
-        Self {
-            rays: Vec::with_capacity(count),
-            things: Vec::with_capacity(count),
-        }
-    }
-
-    fn push(&mut self, ray: Ray, thing: T) {
-        self.rays.push(ray);
-        self.things.push(thing);
-    }
-
-    fn clear(&mut self) {
-        self.rays.clear();
-        self.things.clear();
-    }
 }
 
 impl Path {
@@ -93,38 +49,6 @@ impl Path {
             hide_emitters: properties.boolean("hide_emitters")?,
         })
     }
-
-    /// Adds what the rays' ends bring.
-    fn arrive<C: ColorModel>(
-        &self,
-        scene: &Scene<C>,
-        walkers: &WithRays<Walker<C>>,
-        hits: &[Hit],
-        estimates: &mut [Estimate<C::Sample>],
-    ) {
-        for ((walker, ray), hit) in walkers.things.iter().zip(&walkers.rays).zip(hits) {
-            let brings_light = if hit.is_miss() {
-                scene.has_environment()
-            } else {
-                scene.gives_light(hit) || scene.has_ambient()
-            };
-            if !brings_light {
-                continue;
-            }
-            let estimate = &mut estimates[walker.slot as usize];
-            let at = (!hit.is_miss()).then(|| scene.interaction(ray, hit));
-            let arrival = Arrival {
-                scene,
-                ray,
-                at: at.as_ref(),
-                wavelengths: &walker.wavelengths,
-                throughput: walker.throughput,
-                scattered: walker.scattered,
-                hides_surroundings: self.hide_emitters && estimate.alpha == 0.0,
-            };
-            arrival.add_to(estimate);
-        }
-    }
 }
 
 impl<C: ColorModel> Estimator<C> for Path {
@@ -138,248 +62,114 @@ impl<C: ColorModel> Estimator<C> for Path {
     ) {
         let estimates = &mut estimates.values;
         estimates.clear();
-        let alpha = match self.limits.max_depth {
-            0 => 0.0,
-            _ => opacity_at_start(scene, self.hide_emitters),
-        };
-        let radiance = C::Sample::zero();
-        estimates.resize(starts.len(), Estimate { radiance, alpha });
-        if self.limits.max_depth == 0 {
-            return;
-        }
-        let room = starts.len();
-        let mut walkers = WithRays::with_capacity(room);
-        let mut next = WithRays::with_capacity(room);
-        for (slot, start) in (0..).zip(starts) {
-            let walker = Walker {
-                throughput: scene.color().unit(),
-                wavelengths: start.wavelengths,
-                stream: start.stream,
-                slot,
-                eta: 1.0,
-                scattered: None,
-            };
-            walkers.push(start.ray, walker);
-        }
-        let (mut hits, mut blocked) = (Vec::new(), Vec::new());
-        let mut shadows = WithRays::with_capacity(room);
-        let mut runs = Runs::new(scene.material_count());
-        for depth in 0.. {
-            if walkers.things.is_empty() {
+        estimates.resize(starts.len(), self.limits.start(scene, self.hide_emitters));
+        let mut wave = Wave::new(scene, sampler, starts);
+        for depth in 0..self.limits.max_depth {
+            if wave.is_over() {
                 break;
             }
-            cost.closest(scene, depth, &walkers.rays, &mut hits);
-            if depth == 0 && self.hide_emitters {
-                look_through_emitters(scene, &mut walkers.rays, &mut hits, cost);
-            }
-            self.arrive(scene, &walkers, &hits, estimates);
+            wave.trace(depth, self.hide_emitters, cost);
+            wave.arrive(|slot, mut arrival| {
+                let estimate = &mut estimates[slot];
+                arrival.hides_surroundings = self.hide_emitters && estimate.alpha == 0.0;
+                arrival.add_to(estimate);
+            });
             let Some(first) = BOUNCES.first(depth) else {
                 break;
             };
-            if depth + 1 >= self.limits.max_depth {
+            if depth + 1 == self.limits.max_depth {
                 break;
             }
-            runs.sort(hits.iter().map(|hit| {
-                let met = !hit.is_miss();
-                met.then(|| scene.material_of(hit).index())
-            }));
-            cost.stats.shaded += runs.count() as u64;
-            next.clear();
-            let scatter = Scatter {
+            let mut bounce = Bounce {
                 limits: &self.limits,
-                scene,
-                sampler,
                 depth,
-                first,
-                walkers: &walkers,
-                hits: &hits,
-                runs: &runs,
                 estimates,
-                shadows: &mut shadows,
-                next: &mut next,
             };
-            C::run(scene.tracer().kernel(), scatter);
-            cost.occluded(scene, &shadows.rays, &mut blocked);
-            for (shadow, blocked) in shadows.things.iter().zip(&blocked) {
-                if !blocked {
-                    estimates[shadow.slot as usize].radiance += shadow.contribution;
-                }
-            }
-            shadows.clear();
-            std::mem::swap(&mut walkers, &mut next);
+            let light = |bounce: &mut Bounce<'_, C>, shadow: &Shadow<C::Sample>| {
+                bounce.estimates[shadow.slot as usize].radiance += shadow.contribution;
+            };
+            wave.shade(first, 1, &mut bounce, light, cost);
         }
     }
 }
 
-/// A bounce: paths that have met surfaces are lit and scattered.
-struct Scatter<'a, C: ColorModel> {
+/// A bounce: a light sample and a way on.
+struct Bounce<'a, C: ColorModel> {
     limits: &'a Limits,
-    scene: &'a Scene<C>,
-    sampler: &'a Sampler,
     depth: u32,
-    /// The bounce's first dimension.
-    first: u32,
-    walkers: &'a WithRays<Walker<C>>,
-    hits: &'a [Hit],
-    /// By material.
-    runs: &'a Runs,
     estimates: &'a mut [Estimate<C::Sample>],
-    shadows: &'a mut WithRays<Shadow<C::Sample>>,
-    next: &'a mut WithRays<Walker<C>>,
 }
 
-/// Paths that have met one material.
-struct Block<'a, C: ColorModel> {
-    material: &'a Material<C>,
-    /// Which walkers.
-    indices: &'a [u32],
-    wavelengths: &'a [C::Wavelengths],
-    streams: &'a [Stream],
-}
-
-impl<C: ColorModel> Task for Scatter<'_, C> {
-    type Output = ();
+impl<C: ColorModel> Shading<C> for Bounce<'_, C> {
+    type Shadow = Shadow<C::Sample>;
 
     #[inline(always)]
-    fn run<F: Lanes>(mut self) {
-        let Some(some) = self.walkers.things.first() else {
-            return;
-        };
-        let mut wavelengths = [some.wavelengths; MAX_LANES];
-        let mut streams = [some.stream; MAX_LANES];
-        for (material, run) in self.runs.iter() {
-            let material = self.scene.material_at(material);
-            for indices in run.chunks(F::WIDTH) {
-                for (lane, index) in indices.iter().enumerate() {
-                    let walker = &self.walkers.things[*index as usize];
-                    (wavelengths[lane], streams[lane]) = (walker.wavelengths, walker.stream);
-                }
-                let met = Met {
-                    tracer: self.scene.tracer(),
-                    rays: &self.walkers.rays,
-                    hits: self.hits,
-                    indices,
-                };
-                let block = Block {
-                    material,
-                    indices,
-                    wavelengths: &wavelengths,
-                    streams: &streams[..indices.len()],
-                };
-                self.block(&block, &met.points::<F>());
-            }
-        }
-    }
-}
-
-impl<C: ColorModel> Scatter<'_, C> {
-    #[inline(always)]
-    fn block<F: Lanes>(&mut self, block: &Block<'_, C>, at: &Points<'_, F>) {
-        let walkers = &self.walkers.things;
-        let throughput = C::Columns::<F>::from_samples(|lane| match block.indices.get(lane) {
-            Some(index) => walkers[*index as usize].throughput,
-            None => C::Sample::zero(),
-        });
+    fn shade<F: Lanes>(&mut self, block: &Block<'_, C, F>, out: &mut Outcome<'_, C, Self::Shadow>) {
         if block.material.is_smooth() {
-            self.light(block, at, throughput);
+            self.light(block, out);
         }
-        self.way(block, at, throughput);
+        self.way(block, out);
     }
+}
 
+impl<C: ColorModel> Bounce<'_, C> {
     /// Draws light toward the points, where any may arrive.
     #[inline(always)]
     fn light<F: Lanes>(
-        &mut self,
-        block: &Block<'_, C>,
-        at: &Points<'_, F>,
-        throughput: C::Columns<F>,
+        &self,
+        block: &Block<'_, C, F>,
+        out: &mut Outcome<'_, C, Shadow<C::Sample>>,
     ) {
-        let numbers = Decisions::new(self.sampler, block.streams, self.first, LIGHT);
+        let numbers = block.decisions(LIGHT);
         let (u2, u1) = (numbers.u2::<F>(), numbers.u1::<F>());
-        let w = block.wavelengths;
-        let light = self.scene.sample_lights(at.position, u1, u2, w, at.active);
+        let (at, w) = (&block.at, block.wavelengths);
+        let light = block.scene.sample_lights(at.position, u1, u2, w, at.active);
         let wo = at.frame.to_local(light.direction);
         let value = block.material.eval_lanes(at, at.wi, wo, w);
         let weight = F::select(light.delta, F::one(), power(light.pdf, value.pdf));
-        let contribution = throughput * value.value * light.radiance * (weight / light.pdf);
+        let contribution = block.throughput * value.value * light.radiance * (weight / light.pdf);
         let lit = at.active & F::zero().lt(light.pdf) & !contribution.is_black();
         if !lit.any() {
             return;
         }
-        let rays = at.shadow(light.direction, light.target, light.distant);
-        let (origins, directions) = (rays.origin.rows(), rays.direction.rows());
-        let ends = rays.t_max.row();
         let contributions = contribution.rows();
-        for lane in lit.lanes() {
-            let index = block.indices[lane] as usize;
-            let ray = Ray {
-                origin: Vec3::<F>::of(&origins, lane),
-                direction: Vec3::<F>::of(&directions, lane),
-                t_max: ends[lane],
-                time: self.walkers.rays[index].time,
-            };
-            let shadow = Shadow {
-                contribution: C::Columns::<F>::of(&contributions, lane),
-                slot: self.walkers.things[index].slot,
-            };
-            self.shadows.push(ray, shadow);
-        }
+        out.ask(block, &light, lit, |lane| Shadow {
+            contribution: C::Columns::<F>::of(&contributions, lane),
+            slot: block.walker(lane).slot,
+        });
     }
 
-    /// Turns the paths; those that go on are the next walkers.
+    /// Turns the paths.
     #[inline(always)]
     fn way<F: Lanes>(
         &mut self,
-        block: &Block<'_, C>,
-        at: &Points<'_, F>,
-        throughput: C::Columns<F>,
+        block: &Block<'_, C, F>,
+        out: &mut Outcome<'_, C, Shadow<C::Sample>>,
     ) {
-        let numbers = Decisions::new(self.sampler, block.streams, self.first, WAY);
+        let numbers = block.decisions(WAY);
         let (u2, u1) = (numbers.u2::<F>(), numbers.u1::<F>());
-        let w = block.wavelengths;
+        let (at, w) = (&block.at, block.wavelengths);
         let sample = block.material.sample_lanes(at, at.wi, u1, u2, w);
-        let walkers = &self.walkers.things;
         for lane in (at.active & !(sample.drawn & sample.null)).lanes() {
-            let slot = walkers[block.indices[lane] as usize].slot;
-            self.estimates[slot as usize].alpha = 1.0;
+            self.estimates[block.walker(lane).slot as usize].alpha = 1.0;
         }
-        let passed = F::from_fn(|lane| match block.indices.get(lane) {
-            Some(index) => walkers[*index as usize].eta,
-            None => 1.0,
-        });
-        let eta = passed * sample.eta;
-        let throughput = throughput * sample.weight;
-        let (lives, throughput) = self.limits.roulettes(self.depth, throughput, eta, &numbers);
+        let eta = block.eta() * sample.eta;
+        let throughput = block.throughput * sample.weight;
+        let (lives, throughput) = self.limits.roulette(self.depth, throughput, eta, &numbers);
         let lives = lives & sample.drawn & at.active;
         if !lives.any() {
             return;
         }
-        let direction = at.frame.to_world(sample.wo);
-        let (origins, directions) = (at.origin(direction).rows(), direction.rows());
-        let (places, throughputs) = (at.position.rows(), throughput.rows());
-        let (etas, pdfs) = (eta.row(), sample.pdf.row());
-        let delta = sample.delta.to_bits();
-        for lane in lives.lanes() {
-            let index = block.indices[lane] as usize;
-            let scattered = (delta >> lane & 1 == 0).then(|| Scattered {
-                from: Vec3::<F>::of(&places, lane),
-                pdf: pdfs[lane],
-                light_share: 1.0,
-            });
-            let ray = Ray {
-                origin: Vec3::<F>::of(&origins, lane),
-                direction: Vec3::<F>::of(&directions, lane),
-                t_max: f32::INFINITY,
-                time: self.walkers.rays[index].time,
-            };
-            let walker = Walker {
-                throughput: C::Columns::<F>::of(&throughputs, lane),
-                eta: etas[lane],
-                scattered,
-                ..self.walkers.things[index]
-            };
-            self.next.push(ray, walker);
-        }
+        let ways = Ways {
+            lives,
+            wo: sample.wo,
+            throughput,
+            eta,
+            pdf: sample.pdf,
+            delta: sample.delta,
+            light_share: 1.0,
+        };
+        out.send(block, &ways);
     }
 }
 
@@ -389,11 +179,13 @@ mod tests {
 
     use super::*;
     use crate::accel::Method;
-    use crate::color::{Bands, Rgb};
+    use crate::color::{Bands, Rgb, Spectral as _};
     use crate::description::{self, Description, Kind};
     use crate::integrator::Integrator;
+    use crate::interaction::Ray;
     use crate::lanes::Kernel;
     use crate::math::random;
+    use crate::sampler::Stream;
     use crate::scene::{self, Assets};
 
     /// Surfaces, textures, lights and materials of many kinds, some in lanes and some asked one by one.

@@ -11,18 +11,18 @@
 //! `hide_emitters` are those of `path`;
 //! `layers` takes the image apart, see [`super::layers`].
 
-use super::arrival::{Arrival, look_through_emitters, opacity_at_start};
-use super::bounce::{Bounces, Decision};
+use super::arrival::Arrival;
+use super::bounce::Bounces;
 use super::layers::{Layers, Term};
 use super::limits::{self, Limits};
+use super::wave::{Block, Outcome, Shading, Wave, Ways};
 use super::{Context, Cost, Estimate, Estimates, Estimator, Start};
-use crate::color::{ColorModel, Spectral};
+use crate::color::{ColorModel, Spectra as _, Spectral};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, boolean, choice, string};
 use crate::error::Result;
-use crate::interaction::{Interaction, Ray};
-use crate::light::LightSample;
-use crate::sampler::{Sampler, Stream};
+use crate::lanes::{Lanes, Mask as _};
+use crate::sampler::Sampler;
 use crate::scene::Scene;
 
 /// The settings.
@@ -44,26 +44,9 @@ enum Falloff {
 
 const FALLOFFS: &[&str] = &["none", "inverse_square"];
 
-/// Shadow rays that are asked about at once: a scene may have any number of lights.
-const SHADOWS: usize = 1 << 14;
-
-/// A chain of mirrors and boundaries on its way.
-#[derive(Clone, Copy, Debug)]
-struct Walker<C: ColorModel> {
-    ray: Ray,
-    throughput: C::Sample,
-    wavelengths: C::Wavelengths,
-    stream: Stream,
-    /// Index of the start, and of the estimate.
-    slot: u32,
-    /// Product of the indices of refraction passed.
-    eta: f32,
-}
-
 /// A light's terms, whose visibility is still to be asked.
 #[derive(Clone, Copy, Debug)]
 struct Shadow<S> {
-    ray: Ray,
     diffuse: S,
     specular: S,
     slot: u32,
@@ -79,13 +62,10 @@ struct Batch<'a, S> {
     values: &'a mut Vec<Estimate<S>>,
     /// For each start a value a layer.
     sums: Vec<S>,
-    shadows: Vec<Shadow<S>>,
-    blocked: Vec<bool>,
 }
 
 impl<S: Spectral> Batch<'_, S> {
-    fn add(&mut self, slot: u32, layer: Option<usize>, value: S) {
-        let slot = slot as usize;
+    fn add(&mut self, slot: usize, layer: Option<usize>, value: S) {
         self.values[slot].radiance += value;
         if let Some(layer) = layer {
             self.sums[slot * self.count + layer] += value;
@@ -93,32 +73,24 @@ impl<S: Spectral> Batch<'_, S> {
     }
 
     fn light(&mut self, shadow: &Shadow<S>) {
-        let light = shadow.light as usize;
+        let (slot, light) = (shadow.slot as usize, shadow.light as usize);
         let layers = self.layers;
-        self.add(
-            shadow.slot,
-            layers.place(Term::Diffuse, light),
-            shadow.diffuse,
-        );
-        self.add(
-            shadow.slot,
-            layers.place(Term::Specular, light),
-            shadow.specular,
-        );
+        self.add(slot, layers.place(Term::Diffuse, light), shadow.diffuse);
+        self.add(slot, layers.place(Term::Specular, light), shadow.specular);
     }
 
-    /// Adds what the lights bring that can be seen.
-    fn flush<C: ColorModel<Sample = S>>(&mut self, scene: &Scene<C>, cost: &mut Cost) {
-        let rays: Vec<Ray> = self.shadows.iter().map(|s| s.ray).collect();
-        cost.occluded(scene, &rays, &mut self.blocked);
-        let mut shadows = std::mem::take(&mut self.shadows);
-        for (i, shadow) in shadows.iter().enumerate() {
-            if !self.blocked[i] {
-                self.light(shadow);
-            }
+    /// Adds what a ray's end brings: emission, ambient light, opacity.
+    fn arrive<C: ColorModel<Sample = S>>(&mut self, slot: usize, arrival: &Arrival<'_, '_, C>) {
+        let layers = self.layers;
+        if let (Some(light), Some(emission)) = (arrival.light(), arrival.emission()) {
+            self.add(slot, layers.place(Term::Emission, light.index()), emission);
         }
-        shadows.clear();
-        self.shadows = shadows;
+        if let Some(ambient) = arrival.ambient() {
+            self.add(slot, layers.ambient(), ambient);
+        }
+        if arrival.is_opaque() {
+            self.values[slot].alpha = 1.0;
+        }
     }
 }
 
@@ -157,92 +129,6 @@ impl Phong {
             layers: Layers::build(properties, &context.lights)?,
         })
     }
-
-    /// Adds what the ray's end brings: emission, ambient light, opacity.
-    fn arrive<C: ColorModel>(
-        &self,
-        arrival: &Arrival<'_, '_, C>,
-        slot: u32,
-        batch: &mut Batch<'_, C::Sample>,
-    ) {
-        if let (Some(light), Some(emission)) = (arrival.light(), arrival.emission()) {
-            let layer = self.layers.place(Term::Emission, light.index());
-            batch.add(slot, layer, emission);
-        }
-        if let Some(ambient) = arrival.ambient() {
-            batch.add(slot, self.layers.ambient(), ambient);
-        }
-        if arrival.is_opaque() {
-            batch.values[slot as usize].alpha = 1.0;
-        }
-    }
-
-    /// The terms of one light at a point, as if nothing stood between.
-    fn light<C: ColorModel>(
-        &self,
-        scene: &Scene<C>,
-        sampler: &Sampler,
-        light: usize,
-        walker: &mut Walker<C>,
-        at: &Interaction<'_>,
-    ) -> Option<Shadow<C::Sample>> {
-        let Decision { u2, .. } = Decision::next(&mut walker.stream, sampler);
-        let w = &walker.wavelengths;
-        let LightSample {
-            direction,
-            target,
-            radiance,
-            pdf,
-            ..
-        } = scene.lights()[light].sample(at.position, u2, w)?;
-        let wo = at.frame.to_local(direction);
-        let terms = scene.material(at).phong(at, at.wi, wo, w)?;
-        // What a light sample brings has the inverse square in it.
-        let squared = match (self.falloff, target) {
-            (Falloff::None, Some(target)) => target.distance_squared(at.position),
-            _ => 1.0,
-        };
-        let intensity = walker.throughput * radiance * (squared / pdf);
-        let (diffuse, specular) = (intensity * terms.diffuse, intensity * terms.specular);
-        let dark = diffuse.is_black() && specular.is_black();
-        (!dark).then(|| Shadow {
-            ray: target.map_or_else(|| at.spawn(direction), |target| at.spawn_to(target)),
-            diffuse,
-            specular,
-            slot: walker.slot,
-            light: light as u32,
-        })
-    }
-
-    /// Follows a mirror or a clear boundary at `at`; whether there is one.
-    fn follow<C: ColorModel>(
-        &self,
-        scene: &Scene<C>,
-        sampler: &Sampler,
-        depth: u32,
-        walker: &mut Walker<C>,
-        at: &Interaction<'_>,
-        estimate: &mut Estimate<C::Sample>,
-    ) -> bool {
-        let Decision { u2, u1 } = Decision::next(&mut walker.stream, sampler);
-        let material = scene.material(at);
-        let sample = material.sample(at, at.wi, u1, u2, &walker.wavelengths);
-        if !sample.is_some_and(|sample| sample.null) {
-            estimate.alpha = 1.0;
-        }
-        let Some(sample) = sample.filter(|sample| sample.delta) else {
-            return false;
-        };
-        walker.eta *= sample.eta;
-        walker.ray = at.spawn(at.frame.to_world(sample.wo));
-        let throughput = walker.throughput * sample.weight;
-        let draw = || walker.stream.next_1d(sampler);
-        match self.limits.roulette(depth, throughput, walker.eta, draw) {
-            Some(throughput) => walker.throughput = throughput,
-            None => return false,
-        }
-        true
-    }
 }
 
 impl<C: ColorModel> Estimator<C> for Phong {
@@ -262,13 +148,7 @@ impl<C: ColorModel> Estimator<C> for Phong {
         estimates: &mut Estimates<C::Sample>,
         cost: &mut Cost,
     ) {
-        let nothing = Estimate {
-            radiance: C::Sample::zero(),
-            alpha: match self.limits.max_depth {
-                0 => 0.0,
-                _ => opacity_at_start(scene, self.hide_emitters),
-            },
-        };
+        let nothing = self.limits.start(scene, self.hide_emitters);
         estimates.values.clear();
         estimates.values.resize(starts.len(), nothing);
         let count = self.layers.names().len();
@@ -277,71 +157,37 @@ impl<C: ColorModel> Estimator<C> for Phong {
             count,
             values: &mut estimates.values,
             sums: vec![C::Sample::zero(); starts.len() * count],
-            shadows: Vec::new(),
-            blocked: Vec::new(),
         };
-        let walker = |(slot, start): (usize, &Start<C>)| Walker {
-            ray: start.ray,
-            throughput: scene.color().unit(),
-            wavelengths: start.wavelengths,
-            stream: start.stream,
-            slot: slot as u32,
-            eta: 1.0,
-        };
-        let mut walkers: Vec<Walker<C>> = starts.iter().enumerate().map(walker).collect();
-        let lights = scene.lights().len();
+        let lights = scene.lights().len() as u32;
         let bounces = Bounces {
-            decisions: lights as u32 + 1,
+            decisions: lights + 1,
         };
-        let (mut rays, mut hits) = (Vec::new(), Vec::new());
+        let mut wave = Wave::new(scene, sampler, starts);
         for depth in 0..self.limits.max_depth {
-            if walkers.is_empty() {
+            if wave.is_over() {
                 break;
             }
-            rays.clear();
-            rays.extend(walkers.iter().map(|w| w.ray));
-            cost.closest(scene, depth, &rays, &mut hits);
-
-            if depth == 0 && self.hide_emitters {
-                look_through_emitters(scene, &mut rays, &mut hits, cost);
-            }
-
-            let mut ends = rays.iter().zip(&hits);
-            walkers.retain_mut(|walker| {
-                let (ray, hit) = ends.next().expect("every walker has its ray");
-                let at = (!hit.is_miss()).then(|| scene.interaction(ray, hit));
-                let slot = walker.slot as usize;
-                let arrival = Arrival {
-                    scene,
-                    ray,
-                    at: at.as_ref(),
-                    wavelengths: &walker.wavelengths,
-                    throughput: walker.throughput,
-                    scattered: None,
-                    hides_surroundings: self.hide_emitters && batch.values[slot].alpha == 0.0,
-                };
-                self.arrive(&arrival, walker.slot, &mut batch);
-                let Some(at) = at.filter(|_| depth + 1 < self.limits.max_depth) else {
-                    return false;
-                };
-                cost.stats.shaded += 1;
-                if bounces.begin(&mut walker.stream, depth).is_none() {
-                    return false;
-                }
-                let smooth = scene.material(&at).is_smooth();
-                for light in (0..lights).filter(|_| smooth) {
-                    match self.light(scene, sampler, light, walker, &at) {
-                        Some(shadow) if self.shadows => batch.shadows.push(shadow),
-                        Some(shadow) => batch.light(&shadow),
-                        None => {}
-                    }
-                    if batch.shadows.len() == SHADOWS {
-                        batch.flush(scene, cost);
-                    }
-                }
-                self.follow(scene, sampler, depth, walker, &at, &mut batch.values[slot])
+            wave.trace(depth, self.hide_emitters, cost);
+            wave.arrive(|slot, mut arrival| {
+                arrival.hides_surroundings = self.hide_emitters && batch.values[slot].alpha == 0.0;
+                batch.arrive(slot, &arrival);
             });
-            batch.flush(scene, cost);
+            let Some(first) = bounces.first(depth) else {
+                break;
+            };
+            if depth + 1 == self.limits.max_depth {
+                break;
+            }
+            let mut bounce = Bounce {
+                phong: self,
+                lights,
+                depth,
+                batch: &mut batch,
+            };
+            let light = |bounce: &mut Bounce<'_, '_, C::Sample>, shadow: &Shadow<C::Sample>| {
+                bounce.batch.light(shadow);
+            };
+            wave.shade(first, lights, &mut bounce, light, cost);
         }
 
         let sums = batch.sums;
@@ -352,5 +198,102 @@ impl<C: ColorModel> Estimator<C> for Phong {
             scene.color().develop(sum, w, &mut developed);
             estimates.extra.extend_from_slice(&developed[..3]);
         }
+    }
+}
+
+/// A bounce: all lights, and the way through a mirror or a clear boundary.
+struct Bounce<'a, 'b, S> {
+    phong: &'a Phong,
+    lights: u32,
+    depth: u32,
+    batch: &'a mut Batch<'b, S>,
+}
+
+impl<C: ColorModel> Shading<C> for Bounce<'_, '_, C::Sample> {
+    type Shadow = Shadow<C::Sample>;
+
+    #[inline(always)]
+    fn shade<F: Lanes>(&mut self, block: &Block<'_, C, F>, out: &mut Outcome<'_, C, Self::Shadow>) {
+        if block.material.is_smooth() {
+            for light in 0..self.lights {
+                self.light(block, light, out);
+            }
+        }
+        self.follow(block, out);
+    }
+}
+
+impl<S: Spectral> Bounce<'_, '_, S> {
+    /// The terms of one light.
+    #[inline(always)]
+    fn light<C: ColorModel<Sample = S>, F: Lanes>(
+        &mut self,
+        block: &Block<'_, C, F>,
+        light: u32,
+        out: &mut Outcome<'_, C, Shadow<S>>,
+    ) {
+        let u2 = block.decisions(light).u2::<F>();
+        let (at, w) = (&block.at, block.wavelengths);
+        let from = &block.scene.lights()[light as usize];
+        let sample = from.sample_lanes(at.position, u2, w, at.active);
+        let wo = at.frame.to_local(sample.direction);
+        let terms = block.material.phong_lanes(at, at.wi, wo, w);
+        // What a light sample brings has the inverse square in it.
+        let squared = match self.phong.falloff {
+            Falloff::None => {
+                let squared = (sample.target - at.position).length_squared();
+                F::select(sample.distant, F::one(), squared)
+            }
+            Falloff::InverseSquare => F::one(),
+        };
+        let intensity = block.throughput * sample.radiance * (squared / sample.pdf);
+        let (diffuse, specular) = (intensity * terms.diffuse, intensity * terms.specular);
+        let dark = diffuse.is_black() & specular.is_black();
+        let lit = at.active & F::zero().lt(sample.pdf) & !dark;
+        let (diffuse, specular) = (diffuse.rows(), specular.rows());
+        let shadow = |lane| Shadow {
+            diffuse: C::Columns::<F>::of(&diffuse, lane),
+            specular: C::Columns::<F>::of(&specular, lane),
+            slot: block.walker(lane).slot,
+            light,
+        };
+        if self.phong.shadows {
+            out.ask(block, &sample, lit, shadow);
+        } else {
+            for lane in lit.lanes() {
+                self.batch.light(&shadow(lane));
+            }
+        }
+    }
+
+    /// Follows mirrors and clear boundaries.
+    #[inline(always)]
+    fn follow<C: ColorModel<Sample = S>, F: Lanes>(
+        &mut self,
+        block: &Block<'_, C, F>,
+        out: &mut Outcome<'_, C, Shadow<S>>,
+    ) {
+        let numbers = block.decisions(self.lights);
+        let (u2, u1) = (numbers.u2::<F>(), numbers.u1::<F>());
+        let (at, w) = (&block.at, block.wavelengths);
+        let sample = block.material.sample_lanes(at, at.wi, u1, u2, w);
+        for lane in (at.active & !(sample.drawn & sample.null)).lanes() {
+            self.batch.values[block.walker(lane).slot as usize].alpha = 1.0;
+        }
+        let eta = block.eta() * sample.eta;
+        let throughput = block.throughput * sample.weight;
+        let limits = &self.phong.limits;
+        let (lives, throughput) = limits.roulette(self.depth, throughput, eta, &numbers);
+        let ways = Ways {
+            lives: lives & sample.drawn & sample.delta & at.active,
+            wo: sample.wo,
+            throughput,
+            eta,
+            pdf: sample.pdf,
+            // Lights are not found by chance.
+            delta: F::Mask::splat(true),
+            light_share: 1.0,
+        };
+        out.send(block, &ways);
     }
 }

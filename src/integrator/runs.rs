@@ -1,6 +1,8 @@
 //! Runs: the walkers of a bounce sorted by what they have met, so that blocks of them can be treated alike. The order
 //! within a run is that of the walkers, which no value depends on.
 
+use std::ops::Range;
+
 /// Indices by group, in one list.
 #[derive(Debug)]
 pub(super) struct Runs {
@@ -55,12 +57,13 @@ impl Runs {
         self.indices.len()
     }
 
-    /// The groups that have any, each with its indices.
-    pub(super) fn iter(&self) -> impl Iterator<Item = (usize, &[u32])> {
+    /// The groups that have any of a range of the sorted indices, each with its indices.
+    pub(super) fn part(&self, range: Range<usize>) -> impl Iterator<Item = (usize, &[u32])> {
         let starts = std::iter::once(0).chain(self.ends.iter().copied());
-        let runs = starts
-            .zip(&self.ends)
-            .map(|(start, end)| &self.indices[start..*end]);
+        let runs = starts.zip(&self.ends).map(move |(start, end)| {
+            let (start, end) = (start.max(range.start), (*end).min(range.end));
+            self.indices.get(start..end).unwrap_or_default()
+        });
         runs.enumerate().filter(|(_, run)| !run.is_empty())
     }
 }
@@ -78,7 +81,7 @@ mod tests {
             vec![Some(1)],
         ] {
             runs.sort(groups.iter().copied());
-            let found: Vec<(usize, u32)> = (runs.iter())
+            let found: Vec<(usize, u32)> = (runs.part(0..runs.count()))
                 .flat_map(|(group, run)| run.iter().map(move |index| (group, *index)))
                 .collect();
             let mut expected: Vec<(usize, u32)> = (0..)
@@ -88,6 +91,12 @@ mod tests {
             expected.sort();
             assert_eq!(found, expected);
             assert_eq!(runs.count(), expected.len());
+            for size in 1..4 {
+                let parts = (0..runs.count()).step_by(size);
+                let parts = parts.flat_map(|start| runs.part(start..start + size));
+                let indices: Vec<u32> = parts.flat_map(|(_, run)| run.iter().copied()).collect();
+                assert!(indices.into_iter().eq(expected.iter().map(|pair| pair.1)));
+            }
         }
     }
 }

@@ -1,6 +1,8 @@
 //! Materials in lanes: what a block of paths meets, all of one material. A material is written once: its face for
 //! single points is the same code with one lane.
 
+use std::f32::consts::PI;
+
 use super::{BsdfSample, BsdfValue, Material};
 use crate::color::{ColorModel, Spectra};
 use crate::interaction::Points;
@@ -114,6 +116,54 @@ impl<F: Lanes, S: Spectra<F>> BsdfSamples<F, S> {
             null: either(yes.null, no.null),
         }
     }
+}
+
+/// What Phong's equation as textbooks write it, I = I_a·k_a + Σ I_i·[k_d·max(0, L·N) + k_s·max(0, R·V)ⁿ],
+/// multiplies a light's I_i by. Nothing in it is normalised.
+#[derive(Clone, Copy, Debug)]
+pub struct PhongTerms<S> {
+    /// k_d·max(0, L·N), whoever looks on.
+    pub diffuse: S,
+    /// k_s·max(0, R·V)ⁿ where L·N > 0.
+    pub specular: S,
+}
+
+impl<S> PhongTerms<S> {
+    /// These where the mask is set, else none.
+    #[inline(always)]
+    pub(super) fn only<F: Lanes>(self, mask: F::Mask) -> Self
+    where
+        S: Spectra<F>,
+    {
+        Self {
+            diffuse: S::select(mask, self.diffuse, S::zero()),
+            specular: S::select(mask, self.specular, S::zero()),
+        }
+    }
+
+    /// The terms of a material that shows only this share of itself.
+    #[inline(always)]
+    pub(super) fn weighted<F: Lanes>(self, weight: F) -> Self
+    where
+        S: Spectra<F>,
+    {
+        Self {
+            diffuse: self.diffuse * weight,
+            specular: self.specular * weight,
+        }
+    }
+}
+
+/// A material in lanes that has a part in Phong's equation.
+pub(super) trait PhongBsdf<C: ColorModel> {
+    /// Its terms.
+    fn phong_lanes<F: Lanes>(
+        &self,
+        at: &Points<'_, F>,
+        wi: Vec3<F>,
+        wo: Vec3<F>,
+        w: &[C::Wavelengths],
+    ) -> PhongTerms<C::Columns<F>>;
 }
 
 /// A material in lanes. Wavelengths are given from the first lane on.
@@ -249,6 +299,37 @@ impl<C: ColorModel, F: Lanes> Call<F> for Eval<'_, C, F> {
     }
 }
 
+/// The same arguments, of [`Material::phong_lanes`].
+struct Terms<'a, C: ColorModel, F: Lanes>(Eval<'a, C, F>);
+
+impl<C: ColorModel, F: Lanes> Call<F> for Terms<'_, C, F> {
+    type Output = PhongTerms<C::Columns<F>>;
+
+    #[inline(always)]
+    fn run(self) -> Self::Output {
+        let Eval {
+            material,
+            at,
+            wi,
+            wo,
+            w,
+        } = self.0;
+        match material {
+            Material::BlendBsdf(m) => m.phong_lanes(at, wi, wo, w),
+            Material::BumpMap(m) => m.phong_lanes(at, wi, wo, w),
+            Material::Diffuse(m) => m.phong_lanes(at, wi, wo, w),
+            Material::Mask(m) => m.phong_lanes(at, wi, wo, w),
+            Material::NormalMap(m) => m.phong_lanes(at, wi, wo, w),
+            Material::Phong(m) => m.phong_lanes(at, wi, wo, w),
+            Material::TwoSided(m) => m.phong_lanes(at, wi, wo, w),
+            other => PhongTerms {
+                diffuse: Spectra::zero(),
+                specular: other.eval_lanes(at, wi, wo, w).value * F::splat(PI),
+            },
+        }
+    }
+}
+
 /// The arguments of [`BlockBsdf::sample_lanes`] of a material.
 struct Draw<'a, C: ColorModel, F: Lanes> {
     material: &'a Material<C>,
@@ -311,6 +392,25 @@ impl<C: ColorModel> Material<C> {
             wo,
             w,
         })
+    }
+
+    /// The material's part in Phong's equation. One that has none there gives π times its value, so that a matte one has
+    /// k_d = reflectance; as it may depend on the viewer, that counts as specular.
+    #[inline(always)]
+    pub fn phong_lanes<F: Lanes>(
+        &self,
+        at: &Points<'_, F>,
+        wi: Vec3<F>,
+        wo: Vec3<F>,
+        w: &[C::Wavelengths],
+    ) -> PhongTerms<C::Columns<F>> {
+        F::call(Terms(Eval {
+            material: self,
+            at,
+            wi,
+            wo,
+            w,
+        }))
     }
 
     /// Draws directions: `u1` chooses the lobe, `u2` the direction.

@@ -1,11 +1,11 @@
 //! `diffuse`: Lambert's law, f = reflectance / π on the front side; `reflectance` 0.5 by default.
 
-use super::{BlockBsdf, Bsdf, BsdfSamples, BsdfValues, Lobes, PhongTerms, single_face};
-use crate::color::{Color, ColorModel, Role, Spectra, Spectral};
+use super::{BlockBsdf, Bsdf, BsdfSamples, BsdfValues, Lobes, PhongBsdf, PhongTerms, single_face};
+use crate::color::{Color, ColorModel, Role, Spectra};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, texture};
 use crate::error::Result;
-use crate::interaction::{Interaction, Points};
+use crate::interaction::Points;
 use crate::lanes::{Lanes, Vec2, Vec3, warp};
 use crate::texture::{Palettes, Texture};
 
@@ -90,17 +90,21 @@ impl<C: ColorModel> Bsdf<C> for Diffuse<C> {
     }
 
     single_face!();
+}
 
-    fn phong(
+impl<C: ColorModel> PhongBsdf<C> for Diffuse<C> {
+    #[inline(always)]
+    fn phong_lanes<F: Lanes>(
         &self,
-        at: &Interaction<'_>,
-        wi: glam::Vec3,
-        wo: glam::Vec3,
-        w: &C::Wavelengths,
-    ) -> Option<PhongTerms<C::Sample>> {
-        (wi.z > 0.0 && wo.z > 0.0).then(|| PhongTerms {
-            diffuse: self.reflectance.eval(at, w) * wo.z,
-            specular: C::Sample::zero(),
-        })
+        at: &Points<'_, F>,
+        wi: Vec3<F>,
+        wo: Vec3<F>,
+        w: &[C::Wavelengths],
+    ) -> PhongTerms<C::Columns<F>> {
+        let terms = PhongTerms {
+            diffuse: self.reflectance.eval_lanes(at, w) * wo.z,
+            specular: Spectra::zero(),
+        };
+        terms.only(F::zero().lt(wi.z) & F::zero().lt(wo.z))
     }
 }

@@ -1,8 +1,8 @@
 //! `mask`: the nested material with probability `opacity` (0.5; clamped to [0, 1]), nothing otherwise.
 
 use super::{
-    BlockBsdf, Bsdf, BsdfSamples, BsdfValues, Lobes, Material, PhongTerms, fraction, nested,
-    single_face,
+    BlockBsdf, Bsdf, BsdfSamples, BsdfValues, Lobes, Material, PhongBsdf, PhongTerms, fraction,
+    nested, single_face,
 };
 use crate::color::{ColorModel, Mono, Spectra};
 use crate::description::declared::{Plugin, nested as nested_row, number};
@@ -51,17 +51,6 @@ impl<C: ColorModel> Bsdf<C> for Mask<C> {
 
     single_face!();
 
-    fn phong(
-        &self,
-        at: &Interaction<'_>,
-        wi: glam::Vec3,
-        wo: glam::Vec3,
-        w: &C::Wavelengths,
-    ) -> Option<PhongTerms<C::Sample>> {
-        let terms = self.nested.phong(at, wi, wo, w)?;
-        Some(terms.weighted(fraction(&self.opacity, at)))
-    }
-
     fn ambient(&self, at: &Interaction<'_>, wi: glam::Vec3, w: &C::Wavelengths) -> C::Sample {
         self.nested.ambient(at, wi, w) * fraction(&self.opacity, at)
     }
@@ -106,5 +95,19 @@ impl<C: ColorModel> BlockBsdf<C> for Mask<C> {
             ..nested
         };
         BsdfSamples::select(met, nested, passing)
+    }
+}
+
+impl<C: ColorModel> PhongBsdf<C> for Mask<C> {
+    #[inline(always)]
+    fn phong_lanes<F: Lanes>(
+        &self,
+        at: &Points<'_, F>,
+        wi: Vec3<F>,
+        wo: Vec3<F>,
+        w: &[C::Wavelengths],
+    ) -> PhongTerms<C::Columns<F>> {
+        let opacity = self.opacity.numbers(at).clamp(0.0, 1.0);
+        self.nested.phong_lanes(at, wi, wo, w).weighted(opacity)
     }
 }

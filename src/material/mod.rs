@@ -36,8 +36,8 @@ use crate::family::family;
 use crate::interaction::Interaction;
 use crate::texture::{Palettes, Texture};
 
-use block::{BlockBsdf, single_face};
-pub use block::{BsdfSamples, BsdfValues};
+use block::{BlockBsdf, PhongBsdf, single_face};
+pub use block::{BsdfSamples, BsdfValues, PhongTerms};
 
 /// A direction drawn from a BSDF.
 #[derive(Clone, Copy, Debug)]
@@ -63,26 +63,6 @@ pub struct BsdfValue<S> {
     pub value: S,
     /// The density with which [`Bsdf::sample`] draws `wo`, in 1/sr.
     pub pdf: f32,
-}
-
-/// What Phong's equation as textbooks write it, I = I_a·k_a + Σ I_i·[k_d·max(0, L·N) + k_s·max(0, R·V)ⁿ],
-/// multiplies a light's I_i by. Nothing in it is normalised.
-#[derive(Clone, Copy, Debug)]
-pub struct PhongTerms<S> {
-    /// k_d·max(0, L·N), whoever looks on.
-    pub diffuse: S,
-    /// k_s·max(0, R·V)ⁿ where L·N > 0.
-    pub specular: S,
-}
-
-impl<S: Spectral> PhongTerms<S> {
-    /// The terms of a material that shows only this share of itself.
-    fn weighted(self, weight: f32) -> Self {
-        Self {
-            diffuse: self.diffuse * weight,
-            specular: self.specular * weight,
-        }
-    }
 }
 
 /// The ways in which a material scatters.
@@ -132,22 +112,6 @@ pub trait Bsdf<C: ColorModel>: std::fmt::Debug + Send + Sync {
     fn albedo(&self, at: &Interaction<'_>, wavelengths: &C::Wavelengths) -> C::Sample {
         let straight = self.eval(at, Vec3::Z, Vec3::Z, wavelengths);
         straight.map_or(C::Sample::zero(), |v| v.value * std::f32::consts::PI)
-    }
-
-    /// The material's part in Phong's equation. One that has none there gives π times its value, so that
-    /// a matte one has k_d = reflectance; as it may depend on the viewer, that counts as specular.
-    fn phong(
-        &self,
-        at: &Interaction<'_>,
-        wi: Vec3,
-        wo: Vec3,
-        wavelengths: &C::Wavelengths,
-    ) -> Option<PhongTerms<C::Sample>> {
-        let value = self.eval(at, wi, wo, wavelengths)?;
-        Some(PhongTerms {
-            diffuse: C::Sample::zero(),
-            specular: value.value * std::f32::consts::PI,
-        })
     }
 
     /// The share of ambient light, which comes from nowhere and is never shadowed, that leaves toward `wi`.

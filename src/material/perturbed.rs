@@ -3,7 +3,8 @@
 //! Stein, *A microfacet-based shadowing function to solve the bump terminator problem*, 2019).
 
 use super::{
-    BlockBsdf, Bsdf, BsdfSamples, BsdfValues, Lobes, Material, PhongTerms, nested, single_face,
+    BlockBsdf, Bsdf, BsdfSamples, BsdfValues, Lobes, Material, PhongBsdf, PhongTerms, nested,
+    single_face,
 };
 use crate::color::ColorModel;
 use crate::description::declared::{Row, boolean, nested as nested_row};
@@ -121,25 +122,6 @@ impl<C: ColorModel, N: Normals> Bsdf<C> for Perturbed<C, N> {
 
     single_face!();
 
-    /// The terms about the turned normal; the textbook knows no shadowing of bumps.
-    fn phong(
-        &self,
-        at: &Interaction<'_>,
-        wi: glam::Vec3,
-        wo: glam::Vec3,
-        w: &C::Wavelengths,
-    ) -> Option<PhongTerms<C::Sample>> {
-        let point = Points::one(at);
-        let frame = self.frames(&point, wi.into());
-        let inner_wo = frame.to_local(wo.into());
-        if inner_wo.z * wo.z <= 0.0 {
-            return None;
-        }
-        let (inner, inner_wi) = turned(&point, &frame, wi.into());
-        let (wi, wo) = (inner_wi.into(), inner_wo.into());
-        self.nested.phong(&inner.lane(0), wi, wo, w)
-    }
-
     fn ambient(&self, at: &Interaction<'_>, wi: glam::Vec3, w: &C::Wavelengths) -> C::Sample {
         let point = Points::one(at);
         let frame = self.frames(&point, wi.into());
@@ -187,5 +169,23 @@ impl<C: ColorModel, N: Normals> BlockBsdf<C> for Perturbed<C, N> {
             weight: samples.weight * self.shadowing(&frames, wo),
             ..samples
         }
+    }
+}
+
+/// The terms about the turned normals; the textbook knows no shadowing of bumps.
+impl<C: ColorModel, N: Normals> PhongBsdf<C> for Perturbed<C, N> {
+    #[inline(always)]
+    fn phong_lanes<F: Lanes>(
+        &self,
+        at: &Points<'_, F>,
+        wi: Vec3<F>,
+        wo: Vec3<F>,
+        w: &[C::Wavelengths],
+    ) -> PhongTerms<C::Columns<F>> {
+        let frames = self.frames(at, wi);
+        let (inner, inner_wi) = turned(at, &frames, wi);
+        let inner_wo = frames.to_local(wo);
+        let terms = self.nested.phong_lanes(&inner, inner_wi, inner_wo, w);
+        terms.only(F::zero().lt(inner_wo.z * wo.z))
     }
 }

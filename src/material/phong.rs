@@ -10,7 +10,7 @@
 use std::f32::consts::{FRAC_1_PI, TAU};
 
 use super::{
-    BlockBsdf, Bsdf, BsdfSamples, BsdfValues, Lobes, PhongTerms, fresnel, mean, samples,
+    BlockBsdf, Bsdf, BsdfSamples, BsdfValues, Lobes, PhongBsdf, PhongTerms, fresnel, mean, samples,
     single_face,
 };
 use crate::color::{ColorModel, Mono, Role, Spectral};
@@ -100,21 +100,6 @@ impl<C: ColorModel> Bsdf<C> for Phong<C> {
         self.diffuse_reflectance.eval(at, w) * self.scale
     }
 
-    fn phong(
-        &self,
-        at: &Interaction<'_>,
-        wi: glam::Vec3,
-        wo: glam::Vec3,
-        w: &C::Wavelengths,
-    ) -> Option<PhongTerms<C::Sample>> {
-        let exponent = self.exponent(&Points::one(at));
-        (wi.z > 0.0 && wo.z > 0.0).then(|| PhongTerms {
-            diffuse: self.diffuse_reflectance.eval(at, w) * wo.z,
-            specular: self.specular_reflectance.eval(at, w)
-                * lobe::<f32>(wi.into(), wo.into(), exponent),
-        })
-    }
-
     fn ambient(&self, at: &Interaction<'_>, wi: glam::Vec3, w: &C::Wavelengths) -> C::Sample {
         if wi.z > 0.0 {
             self.ambient_reflectance.eval(at, w)
@@ -165,5 +150,23 @@ impl<C: ColorModel> BlockBsdf<C> for Phong<C> {
         let base = warp::cosine_hemisphere(u2);
         let wo = Vec3::select(u1.lt(F::splat(self.specular_weight)), highlight, base);
         self.eval_lanes(at, wi, wo, w).as_samples(wo, one)
+    }
+}
+
+impl<C: ColorModel> PhongBsdf<C> for Phong<C> {
+    #[inline(always)]
+    fn phong_lanes<F: Lanes>(
+        &self,
+        at: &Points<'_, F>,
+        wi: Vec3<F>,
+        wo: Vec3<F>,
+        w: &[C::Wavelengths],
+    ) -> PhongTerms<C::Columns<F>> {
+        let lobe = lobe(wi, wo, self.exponent(at));
+        let terms = PhongTerms {
+            diffuse: self.diffuse_reflectance.eval_lanes(at, w) * wo.z,
+            specular: self.specular_reflectance.eval_lanes(at, w) * lobe,
+        };
+        terms.only(F::zero().lt(wi.z) & F::zero().lt(wo.z))
     }
 }

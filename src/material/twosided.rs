@@ -1,9 +1,10 @@
 //! `twosided`: lets a one-sided material be seen from both sides; a second nested one covers the back.
 
 use super::{
-    BlockBsdf, Bsdf, BsdfSamples, BsdfValues, Lobes, Material, PhongTerms, nested, single_face,
+    BlockBsdf, Bsdf, BsdfSamples, BsdfValues, Lobes, Material, PhongBsdf, PhongTerms, nested,
+    single_face,
 };
-use crate::color::ColorModel;
+use crate::color::{ColorModel, Spectra};
 use crate::description::declared::{Plugin, boolean, nested as nested_row};
 use crate::description::{Kind, Properties};
 use crate::error::Result;
@@ -73,17 +74,6 @@ impl<C: ColorModel> Bsdf<C> for TwoSided<C> {
 
     single_face!();
 
-    fn phong(
-        &self,
-        at: &Interaction<'_>,
-        wi: glam::Vec3,
-        wo: glam::Vec3,
-        w: &C::Wavelengths,
-    ) -> Option<PhongTerms<C::Sample>> {
-        let (material, flip) = self.side(wi);
-        material.phong(at, wi * flip, wo * flip, w)
-    }
-
     fn ambient(&self, at: &Interaction<'_>, wi: glam::Vec3, w: &C::Wavelengths) -> C::Sample {
         let (material, flip) = self.side(wi);
         material.ambient(at, wi * flip, w)
@@ -139,6 +129,27 @@ impl<C: ColorModel> BlockBsdf<C> for TwoSided<C> {
         BsdfSamples {
             wo: Self::turned(behind, samples.wo),
             ..samples
+        }
+    }
+}
+
+impl<C: ColorModel> PhongBsdf<C> for TwoSided<C> {
+    #[inline(always)]
+    fn phong_lanes<F: Lanes>(
+        &self,
+        at: &Points<'_, F>,
+        wi: Vec3<F>,
+        wo: Vec3<F>,
+        w: &[C::Wavelengths],
+    ) -> PhongTerms<C::Columns<F>> {
+        let behind = wi.z.lt(F::zero());
+        let (wi, wo) = (Self::turned(behind, wi), Self::turned(behind, wo));
+        let front = self.front.phong_lanes(at, wi, wo, w);
+        let Some(back) = &self.back else { return front };
+        let back = back.phong_lanes(at, wi, wo, w);
+        PhongTerms {
+            diffuse: Spectra::select(behind, back.diffuse, front.diffuse),
+            specular: Spectra::select(behind, back.specular, front.specular),
         }
     }
 }

@@ -193,12 +193,6 @@ impl Stream {
         self.dimension = dimension;
     }
 
-    /// Goes on to the next multiple of `dimensions`, a power of two.
-    #[inline]
-    pub fn align(&mut self, dimensions: u32) {
-        self.dimension = self.dimension.next_multiple_of(dimensions);
-    }
-
     /// The next number in [0, 1).
     #[inline]
     pub fn next_1d(&mut self, sampler: &Sampler) -> f32 {

@@ -87,14 +87,9 @@ impl Choice {
         }
     }
 
-    /// The light for `u` in [0, 1).
-    pub(super) fn sample(&self, u: f32) -> Option<LightId> {
-        self.sample_lanes(u).map(|light| LightId(light.0))
-    }
-
-    /// The same for paths in lanes: the lights' indices.
+    /// The lights' indices for `u` in [0, 1).
     #[inline(always)]
-    pub(super) fn sample_lanes<F: Lanes>(&self, u: F) -> Option<F::Int> {
+    pub(super) fn sample<F: Lanes>(&self, u: F) -> Option<F::Int> {
         let starts = self.starts.as_ref()?;
         let one = F::Int::splat(1);
         let mut index = F::Int::splat(0);
@@ -180,7 +175,7 @@ mod tests {
                 "{i}: {share}"
             );
         }
-        assert!(Choice::by(&[0.0, 0.0], &[1.0; 2]).sample(0.3).is_none());
-        assert!(Choice::by(&[], &[]).sample(0.3).is_none());
+        assert!(Choice::by(&[0.0, 0.0], &[1.0; 2]).sample(0.3f32).is_none());
+        assert!(Choice::by(&[], &[]).sample(0.3f32).is_none());
     }
 }

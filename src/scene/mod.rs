@@ -7,14 +7,14 @@ mod choice;
 mod displacement;
 mod files;
 
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 
 use crate::accel::{Counts, Order, Tracer};
 use crate::color::{ColorModel, Spectral};
 use crate::error::Problem;
 use crate::interaction::{Hit, Interaction, Ray};
 use crate::lanes::{self, Ints as _, Kernel, Lanes, Mask as _};
-use crate::light::{Light, LightSample, LightSamples};
+use crate::light::{Light, LightSamples};
 use crate::material::Material;
 
 use choice::Choice;
@@ -172,24 +172,7 @@ impl<C: ColorModel> Scene<C> {
         &self.lights[id.0 as usize]
     }
 
-    /// A direction toward one of the lights from `from`; `u1` chooses the light. The density includes
-    /// the choice.
-    pub fn sample_light(
-        &self,
-        from: Vec3,
-        u1: f32,
-        u2: Vec2,
-        w: &C::Wavelengths,
-    ) -> Option<LightSample<C::Sample>> {
-        let chosen = self.choice.sample(u1)?;
-        let sample = self.light(chosen).sample(from, u2, w)?;
-        Some(LightSample {
-            pdf: sample.pdf * self.choice.probability(chosen),
-            ..sample
-        })
-    }
-
-    /// Directions from points in lanes toward lights, as [`Scene::sample_light`] draws them.
+    /// Directions from points in lanes toward one of the lights each, which `u1` chooses. Densities include the choice.
     #[inline(always)]
     pub fn sample_lights<F: Lanes>(
         &self,
@@ -200,7 +183,7 @@ impl<C: ColorModel> Scene<C> {
         active: F::Mask,
     ) -> LightSamples<F, C::Columns<F>> {
         let mut samples = LightSamples::none();
-        let Some(chosen) = self.choice.sample_lanes(u1) else {
+        let Some(chosen) = self.choice.sample(u1) else {
             return samples;
         };
         let mut indices = F::Int::ROW;
@@ -219,7 +202,7 @@ impl<C: ColorModel> Scene<C> {
     }
 
     /// Radiance that the surface at `at` emits toward `at.wi`, and the density with which
-    /// [`Scene::sample_light`] draws `at` from `from`; `None` where nothing is emitted.
+    /// [`Scene::sample_lights`] draws `at` from `from`; `None` where nothing is emitted.
     pub fn emitted(
         &self,
         at: &Interaction<'_>,

@@ -94,7 +94,9 @@ fn a_render_that_is_killed_at_ten_random_moments_ends_with_the_same_bits() {
     for _ in 0..10 {
         random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
         let mut child = place.start(&keeping);
-        std::thread::sleep(Duration::from_millis(u64::from(10 + (random >> 16) % longest)));
+        std::thread::sleep(Duration::from_millis(u64::from(
+            10 + (random >> 16) % longest,
+        )));
         child.kill().unwrap();
         child.wait().unwrap();
         kept |= place.path("killed.exr.checkpoint").exists();

@@ -1,0 +1,397 @@
+//! The wave: paths of a batch that go a bounce further together. All their rays are traced; those that have met a surface
+//! are shaded in blocks of one material, over lanes; then all their shadow rays are traced, and what they let through is
+//! added by slot. What a bounce does with light is said by whoever implements [`Shading`].
+
+use super::arrival::{Arrival, Scattered, look_through_emitters};
+use super::bounce::Decisions;
+use super::runs::Runs;
+use super::{Cost, Start};
+use crate::accel::Met;
+use crate::color::{ColorModel, Spectra as _, Spectral as _};
+use crate::interaction::{Hit, Points, Ray};
+use crate::lanes::{Lanes, MAX_LANES, Mask as _, Task, Vec3};
+use crate::light::LightSamples;
+use crate::material::Material;
+use crate::sampler::{Sampler, Stream};
+use crate::scene::Scene;
+
+/// A path on its way, beside its ray.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Walker<C: ColorModel> {
+    pub(super) throughput: C::Sample,
+    pub(super) wavelengths: C::Wavelengths,
+    pub(super) stream: Stream,
+    /// Index of the start, and of the estimate.
+    pub(super) slot: u32,
+    /// Product of the indices of refraction passed.
+    pub(super) eta: f32,
+    /// Where the ray was scattered, unless at the camera or into a delta lobe.
+    pub(super) scattered: Option<Scattered>,
+}
+
+/// Things with a ray each.
+#[derive(Debug)]
+struct WithRays<T> {
+    rays: Vec<Ray>,
+    things: Vec<T>,
+}
+
+impl<T> WithRays<T> {
+    fn with_capacity(count: usize) -> Self {
+        Self {
+            rays: Vec::with_capacity(count),
+            things: Vec::with_capacity(count),
+        }
+    }
+
+    fn push(&mut self, ray: Ray, thing: T) {
+        self.rays.push(ray);
+        self.things.push(thing);
+    }
+
+    fn clear(&mut self) {
+        self.rays.clear();
+        self.things.clear();
+    }
+}
+
+/// What a bounce does with light.
+pub(super) trait Shading<C: ColorModel> {
+    /// What is added to an estimate where a shadow ray meets nothing.
+    type Shadow;
+
+    /// Lights and scatters paths that have met one material. Must be `#[inline(always)]`.
+    fn shade<F: Lanes>(&mut self, block: &Block<'_, C, F>, out: &mut Outcome<'_, C, Self::Shadow>);
+}
+
+/// Paths that have met one material.
+pub(super) struct Block<'a, C: ColorModel, F: Lanes> {
+    pub(super) scene: &'a Scene<C>,
+    pub(super) material: &'a Material<C>,
+    /// What they have met.
+    pub(super) at: Points<'a, F>,
+    pub(super) throughput: C::Columns<F>,
+    /// From the first lane on.
+    pub(super) wavelengths: &'a [C::Wavelengths],
+    sampler: &'a Sampler,
+    streams: &'a [Stream],
+    /// The bounce's first dimension.
+    first: u32,
+    walkers: &'a WithRays<Walker<C>>,
+    /// Of the lanes, which walkers they are.
+    indices: &'a [u32],
+}
+
+impl<C: ColorModel, F: Lanes> Block<'_, C, F> {
+    /// The random numbers of the bounce's decision `number`.
+    #[inline(always)]
+    pub(super) fn decisions(&self, number: u32) -> Decisions<'_> {
+        Decisions::new(self.sampler, self.streams, self.first, number)
+    }
+
+    /// A lane's path.
+    #[inline(always)]
+    pub(super) fn walker(&self, lane: usize) -> &Walker<C> {
+        &self.walkers.things[self.indices[lane] as usize]
+    }
+
+    /// The products of the indices of refraction that the paths have passed.
+    #[inline(always)]
+    pub(super) fn eta(&self) -> F {
+        let mut row = F::ROW;
+        for lane in 0..self.indices.len() {
+            row[lane] = self.walker(lane).eta;
+        }
+        F::load(&row)
+    }
+
+    /// A lane's ray from `origin`.
+    #[inline(always)]
+    fn ray(&self, lane: usize, origin: glam::Vec3, direction: glam::Vec3, t_max: f32) -> Ray {
+        Ray {
+            origin,
+            direction,
+            t_max,
+            time: self.walkers.rays[self.indices[lane] as usize].time,
+        }
+    }
+}
+
+/// How paths are scattered.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ways<F: Lanes, S> {
+    /// The lanes that go on.
+    pub(super) lives: F::Mask,
+    /// In the shading frame.
+    pub(super) wo: Vec3<F>,
+    pub(super) throughput: S,
+    pub(super) eta: F,
+    /// Density per solid angle in 1/sr, times the share of samples that are drawn so.
+    pub(super) pdf: F,
+    /// Where light sampling would not find what is met.
+    pub(super) delta: F::Mask,
+    /// The share of samples that are drawn of lights.
+    pub(super) light_share: f32,
+}
+
+/// What comes of a bounce.
+#[derive(Debug)]
+pub(super) struct Outcome<'a, C: ColorModel, T> {
+    shadows: &'a mut WithRays<T>,
+    next: &'a mut WithRays<Walker<C>>,
+}
+
+impl<C: ColorModel, T> Outcome<'_, C, T> {
+    /// Asks in lanes that are `lit` whether light can be seen, and if so adds what `shadow` says of the lane.
+    #[inline(always)]
+    pub(super) fn ask<F: Lanes>(
+        &mut self,
+        block: &Block<'_, C, F>,
+        light: &LightSamples<F, C::Columns<F>>,
+        lit: F::Mask,
+        shadow: impl Fn(usize) -> T,
+    ) {
+        let rays = block
+            .at
+            .shadow(light.direction, light.target, light.distant);
+        let (origins, directions) = (rays.origin.rows(), rays.direction.rows());
+        let ends = rays.t_max.row();
+        for lane in lit.lanes() {
+            let origin = Vec3::<F>::of(&origins, lane);
+            let direction = Vec3::<F>::of(&directions, lane);
+            let ray = block.ray(lane, origin, direction, ends[lane]);
+            self.shadows.push(ray, shadow(lane));
+        }
+    }
+
+    /// Sends paths on their way.
+    #[inline(always)]
+    pub(super) fn send<F: Lanes>(
+        &mut self,
+        block: &Block<'_, C, F>,
+        ways: &Ways<F, C::Columns<F>>,
+    ) {
+        let at = &block.at;
+        let direction = at.frame.to_world(ways.wo);
+        let (origins, directions) = (at.origin(direction).rows(), direction.rows());
+        let (places, throughputs) = (at.position.rows(), ways.throughput.rows());
+        let (etas, pdfs) = (ways.eta.row(), ways.pdf.row());
+        let delta = ways.delta.to_bits();
+        for lane in ways.lives.lanes() {
+            let scattered = (delta >> lane & 1 == 0).then(|| Scattered {
+                from: Vec3::<F>::of(&places, lane),
+                pdf: pdfs[lane],
+                light_share: ways.light_share,
+            });
+            let origin = Vec3::<F>::of(&origins, lane);
+            let direction = Vec3::<F>::of(&directions, lane);
+            let ray = block.ray(lane, origin, direction, f32::INFINITY);
+            let walker = Walker {
+                throughput: C::Columns::<F>::of(&throughputs, lane),
+                eta: etas[lane],
+                scattered,
+                ..*block.walker(lane)
+            };
+            self.next.push(ray, walker);
+        }
+    }
+}
+
+/// Shadow rays that are asked about at once: a scene may have any number of lights.
+const SHADOWS: usize = 1 << 14;
+
+/// Paths of a batch, and what they have met; `T` is what belongs to a shadow ray.
+#[derive(Debug)]
+pub(super) struct Wave<'a, C: ColorModel, T> {
+    scene: &'a Scene<C>,
+    sampler: &'a Sampler,
+    walkers: WithRays<Walker<C>>,
+    hits: Vec<Hit>,
+    next: WithRays<Walker<C>>,
+    shadows: WithRays<T>,
+    blocked: Vec<bool>,
+    /// Those that have met a surface, by material.
+    runs: Runs,
+}
+
+impl<'a, C: ColorModel, T> Wave<'a, C, T> {
+    /// At the camera.
+    pub(super) fn new(scene: &'a Scene<C>, sampler: &'a Sampler, starts: &[Start<C>]) -> Self {
+        let mut walkers = WithRays::with_capacity(starts.len());
+        for (slot, start) in (0..).zip(starts) {
+            let walker = Walker {
+                throughput: scene.color().unit(),
+                wavelengths: start.wavelengths,
+                stream: start.stream,
+                slot,
+                eta: 1.0,
+                scattered: None,
+            };
+            walkers.push(start.ray, walker);
+        }
+        Self {
+            scene,
+            sampler,
+            walkers,
+            hits: Vec::new(),
+            next: WithRays::with_capacity(starts.len()),
+            shadows: WithRays::with_capacity(starts.len()),
+            blocked: Vec::new(),
+            runs: Runs::new(scene.material_count()),
+        }
+    }
+
+    /// Whether no path is on its way.
+    pub(super) fn is_over(&self) -> bool {
+        self.walkers.things.is_empty()
+    }
+
+    /// Traces rays that have bounced `depth` times; those of the camera go on to what lies behind emitters where these are
+    /// hidden.
+    pub(super) fn trace(&mut self, depth: u32, hide_emitters: bool, cost: &mut Cost) {
+        let (rays, hits) = (&mut self.walkers.rays, &mut self.hits);
+        cost.closest(self.scene, depth, rays, hits);
+        if depth == 0 && hide_emitters {
+            look_through_emitters(self.scene, rays, hits, cost);
+        }
+    }
+
+    /// The slots of paths, and whether each has met a surface.
+    pub(super) fn met(&self) -> impl Iterator<Item = (usize, bool)> {
+        let both = self.walkers.things.iter().zip(&self.hits);
+        both.map(|(walker, hit)| (walker.slot as usize, !hit.is_miss()))
+    }
+
+    /// Tells of each ray's end that may bring light, and of its path's slot.
+    pub(super) fn arrive(&self, mut take: impl FnMut(usize, Arrival<'_, '_, C>)) {
+        let scene = self.scene;
+        let walkers = self.walkers.things.iter().zip(&self.walkers.rays);
+        for ((walker, ray), hit) in walkers.zip(&self.hits) {
+            let brings_light = if hit.is_miss() {
+                scene.has_environment()
+            } else {
+                scene.gives_light(hit) || scene.has_ambient()
+            };
+            if !brings_light {
+                continue;
+            }
+            let at = (!hit.is_miss()).then(|| scene.interaction(ray, hit));
+            let arrival = Arrival {
+                scene,
+                ray,
+                at: at.as_ref(),
+                wavelengths: &walker.wavelengths,
+                throughput: walker.throughput,
+                scattered: walker.scattered,
+                hides_surroundings: false,
+            };
+            take(walker.slot as usize, arrival);
+        }
+    }
+
+    /// Shades what was met, with random numbers from dimension `first` on and up to `shadows` shadow rays a path. Tells
+    /// `shading` of those rays that nothing stands in the way of. The paths that were sent on are those that are next.
+    pub(super) fn shade<S: Shading<C, Shadow = T>>(
+        &mut self,
+        first: u32,
+        shadows: u32,
+        shading: &mut S,
+        mut light: impl FnMut(&mut S, &T),
+        cost: &mut Cost,
+    ) {
+        let scene = self.scene;
+        self.runs.sort(self.hits.iter().map(|hit| {
+            let met = !hit.is_miss();
+            met.then(|| scene.material_of(hit).index())
+        }));
+        let count = self.runs.count();
+        cost.stats.shaded += count as u64;
+        self.next.clear();
+        let part = (SHADOWS / shadows.max(1) as usize).next_multiple_of(MAX_LANES);
+        let mut done = 0;
+        while done < count {
+            let end = count.min(done.saturating_add(part));
+            let blocks = Blocks {
+                scene,
+                sampler: self.sampler,
+                first,
+                walkers: &self.walkers,
+                hits: &self.hits,
+                runs: self.runs.part(done..end),
+                shading: &mut *shading,
+                out: Outcome {
+                    shadows: &mut self.shadows,
+                    next: &mut self.next,
+                },
+            };
+            C::run(scene.tracer().kernel(), blocks);
+            cost.occluded(scene, &self.shadows.rays, &mut self.blocked);
+            for (shadow, blocked) in self.shadows.things.iter().zip(&self.blocked) {
+                if !blocked {
+                    light(shading, shadow);
+                }
+            }
+            self.shadows.clear();
+            done = end;
+        }
+        std::mem::swap(&mut self.walkers, &mut self.next);
+    }
+}
+
+/// Runs of paths that are to be shaded.
+struct Blocks<'a, C: ColorModel, S: Shading<C>, R> {
+    scene: &'a Scene<C>,
+    sampler: &'a Sampler,
+    first: u32,
+    walkers: &'a WithRays<Walker<C>>,
+    hits: &'a [Hit],
+    runs: R,
+    shading: &'a mut S,
+    out: Outcome<'a, C, S::Shadow>,
+}
+
+impl<'a, C: ColorModel, S: Shading<C>, R: Iterator<Item = (usize, &'a [u32])>> Task
+    for Blocks<'a, C, S, R>
+{
+    type Output = ();
+
+    #[inline(always)]
+    fn run<F: Lanes>(mut self) {
+        let Some(some) = self.walkers.things.first() else {
+            return;
+        };
+        let mut wavelengths = [some.wavelengths; MAX_LANES];
+        let mut streams = [some.stream; MAX_LANES];
+        for (material, run) in self.runs {
+            for indices in run.chunks(F::WIDTH) {
+                for (lane, index) in indices.iter().enumerate() {
+                    let walker = &self.walkers.things[*index as usize];
+                    (wavelengths[lane], streams[lane]) = (walker.wavelengths, walker.stream);
+                }
+                let met = Met {
+                    tracer: self.scene.tracer(),
+                    rays: &self.walkers.rays,
+                    hits: self.hits,
+                    indices,
+                };
+                let walkers = &self.walkers.things;
+                let block = Block {
+                    scene: self.scene,
+                    material: self.scene.material_at(material),
+                    at: met.points::<F>(),
+                    throughput: C::Columns::<F>::from_samples(|lane| match indices.get(lane) {
+                        Some(index) => walkers[*index as usize].throughput,
+                        None => C::Sample::zero(),
+                    }),
+                    wavelengths: &wavelengths,
+                    sampler: self.sampler,
+                    streams: &streams[..indices.len()],
+                    first: self.first,
+                    walkers: self.walkers,
+                    indices,
+                };
+                self.shading.shade(&block, &mut self.out);
+            }
+        }
+    }
+}
