@@ -7,7 +7,7 @@ use std::sync::Arc;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use crate::math::Transform;
+use crate::math::Moving;
 use crate::shape::{Bounds, Geometry};
 
 use super::wide::{Leaves, Tree};
@@ -352,12 +352,13 @@ impl Group {
         self.bounds
     }
 
-    /// A box around an instance of the group. Turned one by one, the parts' boxes make a closer one than the whole's.
-    pub(super) fn bounds_in(&self, to_world: &Transform) -> Bounds {
+    /// A box around an instance of the group, while the shutter is open. Turned one by one, the parts' boxes make a
+    /// closer one than the whole's.
+    pub(super) fn bounds_in(&self, to_world: &Moving, shutter: (f32, f32)) -> Bounds {
         if !self.unbounded.is_empty() {
             return Bounds::EVERYTHING;
         }
-        let parts = self.parts.iter().map(|part| part.transformed(to_world));
+        let parts = self.parts.iter().map(|part| part.moved(to_world, shutter));
         parts.fold(Bounds::EMPTY, Bounds::union)
     }
 

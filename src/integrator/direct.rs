@@ -149,7 +149,7 @@ impl<C: ColorModel> Estimator<C> for Direct {
             }
             for _ in 0..self.emitter_samples {
                 let Decision { u2, u1 } = Decision::next(&mut stream, sampler);
-                let Some(light) = scene.sample_light(at.position, u1, u2, w) else {
+                let Some(light) = scene.sample_light(at.reference(), u1, u2, w) else {
                     continue;
                 };
                 let Some(value) = material.eval(&at, at.wi, at.frame.to_local(light.direction), w)

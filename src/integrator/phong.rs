@@ -194,7 +194,7 @@ impl Phong {
             radiance,
             pdf,
             ..
-        } = scene.lights()[light].sample(at.position, u2, w)?;
+        } = scene.lights()[light].sample(at.reference(), u2, w)?;
         let wo = at.frame.to_local(direction);
         let terms = scene.material(at).phong(at, at.wi, wo, w)?;
         // What a light sample brings has the inverse square in it.

@@ -12,7 +12,7 @@ use glam::{Vec2, Vec3};
 use crate::accel::{Counts, Order, Tracer};
 use crate::color::{ColorModel, Spectral};
 use crate::error::Problem;
-use crate::interaction::{Hit, Interaction, Ray};
+use crate::interaction::{Hit, Interaction, Points, Ray, Reference};
 use crate::lanes::{self, Kernel, Lanes, MAX_LANES, Mask as _};
 use crate::light::{Light, LightSample, LightSamples};
 use crate::material::Material;
@@ -176,7 +176,7 @@ impl<C: ColorModel> Scene<C> {
     /// the choice.
     pub fn sample_light(
         &self,
-        from: Vec3,
+        from: Reference,
         u1: f32,
         u2: Vec2,
         w: &C::Wavelengths,
@@ -193,19 +193,18 @@ impl<C: ColorModel> Scene<C> {
     #[inline(always)]
     pub fn sample_lights<F: Lanes>(
         &self,
-        from: lanes::Vec3<F>,
+        from: &Points<'_, F>,
         u1: F,
         u2: lanes::Vec2<F>,
         w: &[C::Wavelengths],
-        active: F::Mask,
     ) -> LightSamples<F, C::Columns<F>> {
         let mut samples = LightSamples::none();
         let mut chosen = [None; MAX_LANES];
-        for lane in active.lanes() {
+        for lane in from.lanes() {
             chosen[lane] = self.choice.sample(u1.lane(lane));
         }
         // One light after another.
-        let mut rest = active.to_bits();
+        let mut rest = from.active.to_bits();
         while rest != 0 {
             let light = chosen[rest.trailing_zeros() as usize];
             let alike = (0..F::WIDTH).filter(|lane| chosen[*lane] == light);
@@ -237,13 +236,13 @@ impl<C: ColorModel> Scene<C> {
         })
     }
 
-    /// The same for a direction in which a ray meets nothing.
-    pub fn surrounding(&self, direction: Vec3, w: &C::Wavelengths) -> Option<(C::Sample, f32)> {
+    /// The same for a ray that meets nothing.
+    pub fn surrounding(&self, ray: &Ray, w: &C::Wavelengths) -> Option<(C::Sample, f32)> {
         let id = self.environment?;
         let light = self.light(id);
-        let radiance = light.environment_radiance(direction, w);
+        let radiance = light.environment_radiance(ray.direction, ray.time, w);
         (!radiance.is_black()).then(|| {
-            let pdf = light.environment_pdf(direction) * self.choice.probability(id);
+            let pdf = light.environment_pdf(ray.direction, ray.time) * self.choice.probability(id);
             (radiance, pdf)
         })
     }

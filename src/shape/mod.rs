@@ -26,14 +26,14 @@ use std::path::{Path, PathBuf};
 use glam::{DAffine3, DMat3, DMat4, DVec3, Vec2, Vec3};
 
 use crate::description::declared::{
-    Plugin, Plugins, Row, boolean, file, float, nested, number, transform,
+    Plugin, Plugins, Row, boolean, file, float, motion, nested, number, transform,
 };
 use crate::description::{Kind, Properties};
 use crate::error::{Problem, Result};
 use crate::family;
 use crate::interaction::{Hit, Interaction, Ray, offset};
 use crate::lanes::{self, Lanes, Mask as _};
-use crate::math::Transform;
+use crate::math::{Moving, Transform};
 use crate::mesh::{Loaded, Mesh, MeshFile, ReadOptions, read};
 
 pub use disk::Disk;
@@ -106,6 +106,19 @@ impl Bounds {
         Self {
             min: min + origin - error,
             max: max + origin + error,
+        }
+    }
+
+    /// A box around the box's images at all times of an interval (first, last), with room for rounding.
+    #[must_use]
+    pub fn moved(self, moving: &Moving, interval: (f32, f32)) -> Self {
+        match moving {
+            Moving::Still(transform) => self.transformed(transform),
+            _ if self.is_empty() => self,
+            Moving::Keyed(_) => {
+                let [min, max] = moving.swept([self.min, self.max], interval);
+                Self { min, max }
+            }
         }
     }
 
@@ -337,7 +350,7 @@ fn single(properties: &Properties<'_>) -> Option<&'static Build> {
 }
 
 /// From a shape's space to that in which it stands.
-const TO_WORLD: Row = transform("to_world", "from the shape's space to the world");
+const TO_WORLD: Row = motion("to_world", "from the shape's space to the world");
 /// Which side is the front.
 const FLIP_NORMALS: Row = boolean("flip_normals", false, "whether the other side is the front");
 const BSDF: Row = nested(Kind::Bsdf, "how it scatters light; diffuse without one");
@@ -426,7 +439,7 @@ const COMPOUND: Plugins = &[
         &Plugin {
             about: "a shapegroup once more",
             properties: &[&[
-                transform("to_world", "from the group's space to the world"),
+                motion("to_world", "from the group's space to the world"),
                 nested(Kind::Shape, "the shapegroup, by reference"),
             ]],
         },
@@ -510,7 +523,43 @@ pub fn build_from(
 
 /// The property `to_world`, the identity by default, and then `outer`.
 fn to_world(properties: &Properties<'_>, outer: &DMat4) -> Result<DMat4> {
-    Ok(*outer * properties.transform("to_world")?)
+    Ok(*outer * Placement::of(properties)?.still)
+}
+
+/// The property `to_world` of a shape.
+#[derive(Clone, Debug)]
+pub struct Placement {
+    /// What stands still: the whole, unless it moves.
+    pub still: DMat4,
+    /// What moves; then that which stands still is the identity.
+    pub moving: Option<Moving>,
+}
+
+impl Placement {
+    /// Of what `properties` name.
+    ///
+    /// # Errors
+    /// Where it makes no motion.
+    pub fn of(properties: &Properties<'_>) -> Result<Self> {
+        let Some(keyframes) = properties.animation("to_world")? else {
+            let still = properties.transform("to_world")?;
+            return Ok(Self {
+                still,
+                moving: None,
+            });
+        };
+        let moving = properties.motion("to_world")?;
+        Ok(match moving.is_still() {
+            true => Self {
+                still: keyframes[0].1,
+                moving: None,
+            },
+            false => Self {
+                still: DMat4::IDENTITY,
+                moving: Some(moving),
+            },
+        })
+    }
 }
 
 /// A bound, for each axis, on the error of a world position that was computed in double precision from the
