@@ -15,7 +15,7 @@ mod wide;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
 use crate::error::{Error, Problem};
@@ -177,6 +177,8 @@ pub struct Tracer {
     groups: Vec<Group>,
     /// Of the deepest tree of an instance.
     inner_levels: usize,
+    /// Whether any tree moves.
+    deforms: bool,
     /// Whether the trees do not fit into the caches near a core.
     is_large: bool,
     method: Method,
@@ -185,8 +187,8 @@ pub struct Tracer {
 }
 
 impl Tracer {
-    /// `group_of[i]` is the group of shape `i`: 0 for the world, others for instances. Triangles with
-    /// corners that are not finite must have been dropped before.
+    /// `group_of[i]` is the group of shape `i`: 0 for the world, others for instances. A mesh that deforms has a group of
+    /// its own. Triangles with corners that are not finite must have been dropped before.
     pub fn new(
         shapes: Vec<Arc<Geometry>>,
         group_of: &[u32],
@@ -207,7 +209,12 @@ impl Tracer {
         }
         let mut cache = CacheUse::default();
         let mut group = |of: &[u32], instances: Option<&[Bounds]>| {
-            let (group, used) = Group::new(Members::new(&shapes, of, instances), &recipe);
+            let deforming = match of {
+                [shape] if instances.is_none() => Group::deforming(&shapes, *shape, &recipe),
+                _ => None,
+            };
+            let (group, used) = deforming
+                .unwrap_or_else(|| Group::new(Members::new(&shapes, of, instances), &recipe));
             cache.add(used);
             group
         };
@@ -220,12 +227,13 @@ impl Tracer {
             .collect();
         let world = group(&shapes_of[0], Some(&instance_bounds));
         groups.insert(0, world);
-        let inner = groups[1..].iter().map(|group| group.tree().levels());
+        let inner = groups[1..].iter().map(Group::levels);
         Self {
             shapes,
             instances,
             instance_bounds,
             inner_levels: inner.max().unwrap_or(0),
+            deforms: groups.iter().any(Group::deforms),
             is_large: groups.iter().map(Group::bytes).sum::<usize>() > CACHED,
             groups,
             method: recipe.method,
@@ -284,20 +292,23 @@ impl Tracer {
 
     /// Where the point at `at`, which `hit` has met, is at another time; world space.
     pub fn position_at(&self, hit: &Hit, at: &Interaction<'_>, time: f32) -> Vec3 {
-        match self.instances.get(hit.instance as usize) {
-            Some(Instance { to_world, .. }) if !to_world.is_still() => {
-                let local = to_world.at(at.time).inverse().point(at.position);
-                to_world.at(time).point(local)
+        let Some(Instance { to_world, .. }) = self.instances.get(hit.instance as usize) else {
+            return at.position;
+        };
+        let local = match self.shapes.get(hit.shape) {
+            Geometry::Deforming(mesh) => {
+                mesh.position(hit.primitive, Vec2::new(hit.u, hit.v), time)
             }
-            _ => at.position,
-        }
+            _ if to_world.is_still() => return at.position,
+            _ => to_world.at(at.time).inverse().point(at.position),
+        };
+        to_world.at(time).point(local)
     }
 
     /// Whether anything moves.
     pub fn moves(&self) -> bool {
-        self.instances
-            .iter()
-            .any(|instance| !instance.to_world.is_still())
+        let moves = |instance: &Instance| !instance.to_world.is_still();
+        self.deforms || self.instances.iter().any(moves)
     }
 
     /// Primitives, each instance's counted once.

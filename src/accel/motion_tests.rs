@@ -9,7 +9,7 @@ use super::surface_tests::{surface, uniform};
 use super::tests::{agree, all, direction};
 use super::*;
 use crate::mesh::{self, Mesh};
-use crate::shape::TriangleMesh;
+use crate::shape::{DeformingMesh, TriangleMesh};
 
 fn geometry(mesh: Mesh) -> Arc<Geometry> {
     Arc::new(Geometry::Mesh(TriangleMesh::new(mesh)))
@@ -181,4 +181,114 @@ fn a_point_is_found_again_at_other_times() {
     }
     assert!(moved > 300, "{moved}");
     assert_eq!(Vec3::ZERO, Moving::IDENTITY.at(3.0).point(Vec3::ZERO));
+}
+
+/// A ball that swells, leans and is carried on, with its vertices at three times.
+fn deforming(seed: u64) -> Arc<Geometry> {
+    let at = |time: f32| {
+        let mut mesh = mesh::bumpy_sphere(3, seed);
+        for (i, position) in (0..).zip(&mut mesh.positions) {
+            let wave = direction(seed + 1, i) * 0.1 * time;
+            let swollen = *position * (1.0 + 0.5 * (3.0 * position.x + 2.0 * time).sin());
+            *position = swollen + wave + Vec3::new(0.8 * time * position.y, time * time - 1.0, 0.0);
+        }
+        mesh.compute_normals();
+        TriangleMesh::new(mesh)
+    };
+    let times = vec![0.1, 0.4, 1.0];
+    let meshes = times.iter().map(|time| at(*time)).collect();
+    Arc::new(Geometry::Deforming(
+        DeformingMesh::new(meshes, times).unwrap(),
+    ))
+}
+
+#[test]
+fn what_deforms_is_met_alike_by_every_kernel_and_by_brute_force() {
+    let (mut shapes, mut groups, mut instances) = parts();
+    for (number, to_world) in [(5, Moving::IDENTITY), (6, motions().remove(1))] {
+        shapes.push(deforming(number.into()));
+        groups.push(number);
+        instances.push(Instance {
+            to_world,
+            group: number,
+        });
+    }
+    let tracers = all(&shapes, &groups, &instances);
+    assert!(agree(&tracers, &rays(350, 20_000)) > 8000);
+    let alone = [Instance {
+        to_world: Moving::IDENTITY,
+        group: 1,
+    }];
+    assert!(agree(&all(&shapes[7..8], &[1], &alone), &rays(360, 20_000)) > 3000);
+}
+
+#[test]
+fn what_deforms_is_at_its_times_what_the_meshes_are() {
+    let geometry = deforming(3);
+    let Geometry::Deforming(mesh) = &*geometry else {
+        panic!("it deforms")
+    };
+    let alone = vec![Instance {
+        to_world: Moving::IDENTITY,
+        group: 1,
+    }];
+    let moving = Tracer::new(vec![geometry.clone()], &[1], alone, Method::Tree);
+    for (seed, time) in (370..).zip([0.1, 0.25, 0.4, 0.8, 1.0]) {
+        let mut still = mesh.mesh().clone();
+        for (number, triangle) in (0..).zip(&mesh.mesh().triangles) {
+            let corners = mesh.corners(number, mesh.moment(time));
+            for (index, corner) in triangle.iter().zip(corners) {
+                still.positions[*index as usize] = corner;
+            }
+        }
+        let still = Tracer::new(vec![self::geometry(still)], &[0], Vec::new(), Method::Tree);
+        let rays = rays(seed, 4000).into_iter().map(|ray| Ray { time, ..ray });
+        let rays: Vec<Ray> = rays.collect();
+        let [a, b] = [&moving, &still].map(|tracer| {
+            let mut hits = Vec::new();
+            tracer.closest(&rays, Order::Any, &mut hits, &mut Counts::default());
+            hits
+        });
+        let mut met = 0;
+        for ((a, b), ray) in a.iter().zip(&b).zip(&rays) {
+            assert_eq!((a.t, a.u, a.v, a.primitive), (b.t, b.u, b.v, b.primitive));
+            if a.is_miss() {
+                continue;
+            }
+            met += 1;
+            let [p, q] =
+                [(&moving, a), (&still, b)].map(|(tracer, hit)| tracer.interaction(ray, hit));
+            assert!(p.position.distance(q.position) < 1e-5 && p.normal.distance(q.normal) < 1e-4);
+            // The normals of the vertices at both ends of the way, and of none between, were computed.
+            let end = time == 0.1 || time == 1.0;
+            assert!(!end || p.frame.n.dot(p.normal) > 0.0);
+            let again = moving.position_at(a, &p, time);
+            assert!(again.distance(p.position) < 1e-4);
+        }
+        assert!(met > 500, "{time}: {met}");
+    }
+}
+
+#[test]
+fn memory_of_what_deforms_is_less_than_twice_that_of_what_stands() {
+    let mesh = || {
+        let mut mesh = mesh::bumpy_sphere(6, 1);
+        mesh.compute_normals();
+        TriangleMesh::new(mesh)
+    };
+    let still = Geometry::Mesh(mesh());
+    let moving = DeformingMesh::new(vec![mesh(), mesh()], vec![0.0, 1.0]).unwrap();
+    let moving = Geometry::Deforming(moving);
+    let bytes = |geometry: Geometry, group: u32| {
+        let own = geometry.bytes();
+        let instances = (0..group).map(|_| Instance {
+            to_world: Moving::IDENTITY,
+            group,
+        });
+        let instances = instances.collect();
+        let tracer = Tracer::new(vec![Arc::new(geometry)], &[group], instances, Method::Tree);
+        own + tracer.tree_bytes()
+    };
+    let ratio = bytes(moving, 1) as f64 / bytes(still, 0) as f64;
+    assert!(ratio < 1.9, "{ratio}");
 }

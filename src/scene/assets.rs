@@ -7,7 +7,7 @@
 //! The graph is flattened here: a shape is loaded for each path that leads to it, in world space.
 //!
 //! What moves is a group of its own with one instance, whose transform has a time: a shape by itself, the shapes of a
-//! node together.
+//! node together. A mesh that deforms is such a group too, whether it moves or not.
 
 use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
@@ -252,18 +252,30 @@ impl<'a> Plan<'a> {
         space: &Space<'a>,
         moving: Option<Moving>,
     ) -> Result<Space<'a>> {
-        if moving.is_none() {
+        let deforms = shape::deforms(properties);
+        if moving.is_none() && !deforms {
             return Ok(space.clone());
         }
         if let Some(group) = space.shapegroup {
-            let error =
-                properties.error("to_world", "what is in a shapegroup cannot move by itself");
-            return Err(error
+            let message = "what is in a shapegroup cannot move by itself, nor deform";
+            return Err(properties
+                .error("to_world", message)
                 .help("animate the instance, or a shape that is in no shapegroup")
                 .related(group.location(), "the group"));
         }
-        let motion = self.motion(properties, space, &DMat4::IDENTITY, moving.as_ref())?;
         self.group_count += 1;
+        if moving.is_none() {
+            // It moves with what is around it, and has a tree of its own.
+            self.instances.push(Instance {
+                to_world: space.motion.clone().unwrap_or(Moving::IDENTITY),
+                group: self.group_count,
+            });
+            return Ok(Space {
+                group: self.group_count,
+                ..space.clone()
+            });
+        }
+        let motion = self.motion(properties, space, &DMat4::IDENTITY, moving.as_ref())?;
         self.instances.push(Instance {
             to_world: motion.clone(),
             group: self.group_count,

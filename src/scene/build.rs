@@ -140,6 +140,15 @@ impl<C: ColorModel> Builder<'_, C> {
                 );
                 None
             }
+            Some(emitter) if matches!(**geometry, Geometry::Deforming(_)) => {
+                let error = Error::unsupported("a mesh that deforms cannot be a light");
+                self.problems.push(
+                    error
+                        .at(emitter.location())
+                        .help("let a mesh emit that keeps its shape; it may move"),
+                );
+                None
+            }
             Some(emitter) => {
                 self.worn.insert(emitter.node_id());
                 self.light(emitter, Some(member))
