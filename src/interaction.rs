@@ -30,6 +30,15 @@ impl Ray {
     }
 }
 
+/// Where and when light is asked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reference {
+    /// World space.
+    pub position: Vec3,
+    /// Absolute time.
+    pub time: f32,
+}
+
 /// Where a ray first meets a shape. Hits are ordered by (t, instance, shape, primitive), so that the
 /// closest one does not depend on the order in which a tree is walked.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -128,6 +137,14 @@ impl Interaction<'_> {
             primitive: 0,
             mesh: None,
             barycentric: Vec2::ZERO,
+        }
+    }
+
+    /// Where and when it is.
+    pub fn reference(&self) -> Reference {
+        Reference {
+            position: self.position,
+            time: self.time,
         }
     }
 

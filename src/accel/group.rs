@@ -7,8 +7,8 @@ use std::sync::Arc;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use crate::math::Transform;
-use crate::shape::{Bounds, Geometry};
+use crate::math::Moving;
+use crate::shape::{Bounds, DeformingMesh, Geometry, Moment, Surface as _};
 
 use super::wide::{Leaves, Tree};
 use super::{CacheUse, Method, Recipe};
@@ -311,6 +311,52 @@ impl Leaves for Members<'_> {
     }
 }
 
+/// A mesh that deforms, half way from one set of its vertices to the next.
+struct Halfway<'a> {
+    mesh: &'a DeformingMesh,
+    segment: usize,
+    /// The number of the first triangle.
+    first: u32,
+}
+
+impl Leaves for Halfway<'_> {
+    fn count(&self) -> u32 {
+        self.mesh.primitive_count()
+    }
+
+    fn bounds(&self, item: u32) -> Bounds {
+        let (_, corners) = self.triangle(item);
+        corners.into_iter().fold(Bounds::EMPTY, Bounds::with)
+    }
+
+    fn is_triangle(&self, _item: u32) -> bool {
+        true
+    }
+
+    fn triangle(&self, item: u32) -> (u32, [Vec3; 3]) {
+        let moment = Moment {
+            segment: self.segment,
+            part: 0.5,
+        };
+        (self.first + item, self.mesh.corners(item, moment))
+    }
+
+    fn numbers(&self) -> Vec<Range<u32>> {
+        vec![self.first..self.first + self.count()]
+    }
+
+    fn digest(&self, hasher: &mut blake3::Hasher) {
+        hasher.update(b"half way");
+        for item in 0..self.count() {
+            let (number, corners) = self.triangle(item);
+            hasher.update(&number.to_le_bytes());
+            for c in corners.iter().flat_map(|corner| corner.to_array()) {
+                hasher.update(&c.to_le_bytes());
+            }
+        }
+    }
+}
+
 /// See the module.
 #[derive(Debug)]
 pub(super) struct Group {
@@ -319,6 +365,8 @@ pub(super) struct Group {
     items: Vec<Item>,
     has_instances: bool,
     tree: Tree,
+    /// The mesh that deforms, if it is one, with a tree for the way from each set of vertices to the next.
+    deforming: Option<(u32, Vec<Tree>)>,
     bounds: Bounds,
     /// Boxes that together hold what the tree holds; the world has none.
     parts: Vec<Bounds>,
@@ -347,10 +395,69 @@ impl Group {
             has_instances: !members.boxes().is_empty(),
             unbounded: members.unbounded,
             tree,
+            deforming: None,
             bounds,
             parts,
         };
         (group, used)
+    }
+
+    /// A mesh that deforms, by itself.
+    pub(super) fn deforming(
+        shapes: &Shapes,
+        shape: u32,
+        recipe: &Recipe,
+    ) -> Option<(Self, CacheUse)> {
+        let Geometry::Deforming(mesh) = shapes.get(shape) else {
+            return None;
+        };
+        let brute = Recipe {
+            method: Method::Brute,
+            ..recipe.clone()
+        };
+        let (mut group, mut used) = Self::new(Members::new(shapes, &[shape], None), &brute);
+        if recipe.method != Method::Tree {
+            return Some((group, used));
+        }
+        group.items = Vec::new();
+        let first = shapes.number(Item::primitive(shape, 0));
+        let trees = (0..mesh.segments()).map(|segment| {
+            let halfway = Halfway {
+                mesh,
+                segment,
+                first,
+            };
+            let (tree, _, more) = Tree::build(&halfway, recipe.build, recipe.cache.as_deref());
+            used.add(more);
+            tree.fitted(&|number| mesh.ends(number - first, segment))
+        });
+        group.deforming = Some((shape, trees.collect()));
+        Some((group, used))
+    }
+
+    /// Whether its tree moves.
+    pub(super) fn deforms(&self) -> bool {
+        self.deforming.is_some()
+    }
+
+    /// The tree at a time, and how far it has come on its way.
+    #[inline]
+    pub(super) fn tree_at(&self, shapes: &Shapes, time: f32) -> (&Tree, f32) {
+        if let Some((shape, trees)) = &self.deforming
+            && let Geometry::Deforming(mesh) = shapes.get(*shape)
+        {
+            let moment = mesh.moment(time);
+            return (&trees[moment.segment], moment.part);
+        }
+        (&self.tree, 0.0)
+    }
+
+    /// Nodes on the longest way down.
+    pub(super) fn levels(&self) -> usize {
+        let moving = self.deforming.iter().flat_map(|(_, trees)| trees);
+        moving
+            .map(Tree::levels)
+            .fold(self.tree.levels(), usize::max)
     }
 
     /// What the tree does not hold.
@@ -377,16 +484,24 @@ impl Group {
         self.bounds
     }
 
-    /// A box around an instance of the group. Turned one by one, the parts' boxes make a closer one than the whole's.
-    pub(super) fn bounds_in(&self, to_world: &Transform) -> Bounds {
+    /// A box around an instance of the group, while the shutter is open. Turned one by one, the parts' boxes make a
+    /// closer one than the whole's.
+    pub(super) fn bounds_in(&self, to_world: &Moving, shutter: (f32, f32)) -> Bounds {
         if !self.unbounded.is_empty() {
             return Bounds::EVERYTHING;
         }
-        let parts = self.parts.iter().map(|part| part.transformed(to_world));
+        let parts = self.parts.iter().map(|part| part.moved(to_world, shutter));
         parts.fold(Bounds::EMPTY, Bounds::union)
     }
 
     pub(super) fn bytes(&self) -> usize {
-        (self.unbounded.len() + self.items.len()) * size_of::<Item>() + self.tree.bytes()
+        (self.unbounded.len() + self.items.len()) * size_of::<Item>()
+            + self.tree.bytes()
+            + self
+                .deforming
+                .iter()
+                .flat_map(|(_, trees)| trees)
+                .map(Tree::bytes)
+                .sum::<usize>()
     }
 }

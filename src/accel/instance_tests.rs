@@ -16,7 +16,10 @@ fn geometry(mesh: Mesh) -> Arc<Geometry> {
 
 fn instance(group: u32, matrix: &DMat4) -> Instance {
     let to_world = Transform::new(matrix).expect("a matrix with an inverse");
-    Instance { to_world, group }
+    Instance {
+        to_world: Moving::Still(to_world),
+        group,
+    }
 }
 
 /// Turns, shears, stretches unevenly and, every other time, mirrors.
@@ -66,11 +69,15 @@ fn instances_and_moved_meshes_are_one_under_every_affine_map() {
         let there = instance(1, &matrix);
         // As long as they become: normals of unit length between which is interpolated would be others.
         moved.normals = (mesh.normals.iter())
-            .map(|n| there.to_world.normal(*n))
+            .map(|n| there.to_world.at(0.0).normal(*n))
             .collect();
         let alone = Tracer::new(vec![geometry(moved)], &[0], Vec::new(), Method::Tree);
         // A moved mesh keeps its winding, an instance its front: as in Mitsuba.
-        let side = if there.to_world.mirrors() { -1.0 } else { 1.0 };
+        let side = if there.to_world.at(0.0).mirrors() {
+            -1.0
+        } else {
+            1.0
+        };
         let instanced = Tracer::new(vec![geometry(mesh)], &[1], vec![there], Method::Tree);
         let rays = rays(100 + u64::from(i), 2000);
         let pairs = closest(&alone, &rays).into_iter();
@@ -241,7 +248,7 @@ fn an_instance_s_box_holds_it_and_is_closer_than_its_group_s_box_turned() {
     let (mut close, mut loose) = (0.0, 0.0);
     for i in 0..32 {
         let there = instance(1, &affine(i));
-        let to_world = there.to_world;
+        let to_world = there.to_world.at(0.0);
         let tracer = Tracer::new(shapes.clone(), &[1], vec![there], Method::Tree);
         let bounds = tracer.bounds();
         for corner in &corners {

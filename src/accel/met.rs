@@ -144,6 +144,10 @@ impl Source for Met<'_> {
         self.tracer.interaction(self.ray(lane), self.hit(lane))
     }
 
+    fn time(&self, lane: usize) -> f32 {
+        self.ray(lane).time
+    }
+
     fn on_mesh(&self, lane: usize) -> Option<(&Mesh, u32, Vec2)> {
         let hit = self.hit(lane);
         let mesh = self.tracer.shapes.get(hit.shape).mesh()?;

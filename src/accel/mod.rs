@@ -15,12 +15,13 @@ mod wide;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
 use crate::error::{Error, Problem};
 use crate::interaction::{Hit, Interaction, Ray};
 use crate::lanes::Kernel;
-use crate::math::Transform;
+use crate::math::{Moving, Transform};
 use crate::shape::{Bounds, Geometry};
 
 use group::{Group, Members, Shapes};
@@ -100,7 +101,7 @@ const MEDIUM_PAYS: u64 = 200;
 const SLOW_PAYS: u64 = 400;
 
 /// How a tracer is made.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Recipe {
     /// Tree or brute force.
     pub method: Method,
@@ -108,6 +109,20 @@ pub struct Recipe {
     pub build: Build,
     /// A folder in which trees are kept: what was built once is read from there. It is made where it is not there.
     pub cache: Option<PathBuf>,
+    /// The first and the last time of rays: what moves is bounded for these.
+    pub shutter: (f32, f32),
+}
+
+impl Default for Recipe {
+    /// A tree for rays of all times.
+    fn default() -> Self {
+        Self {
+            method: Method::default(),
+            build: Build::default(),
+            cache: None,
+            shutter: (f32::NEG_INFINITY, f32::INFINITY),
+        }
+    }
 }
 
 /// What a folder of trees was good for.
@@ -146,8 +161,8 @@ impl From<Method> for Recipe {
 /// A group's shapes put into the world once more.
 #[derive(Clone, Debug)]
 pub struct Instance {
-    /// From the group's space to the world.
-    pub to_world: Transform,
+    /// From the group's space to the world, at the time of each ray.
+    pub to_world: Moving,
     /// Which group, from 1.
     pub group: u32,
 }
@@ -157,11 +172,13 @@ pub struct Instance {
 pub struct Tracer {
     shapes: Shapes,
     instances: Vec<Instance>,
-    /// Each instance's box in the world.
+    /// Each instance's box in the world, for all times of rays.
     instance_bounds: Vec<Bounds>,
     groups: Vec<Group>,
     /// Of the deepest tree of an instance.
     inner_levels: usize,
+    /// Whether any tree moves.
+    deforms: bool,
     /// Whether the trees do not fit into the caches near a core.
     is_large: bool,
     method: Method,
@@ -170,8 +187,8 @@ pub struct Tracer {
 }
 
 impl Tracer {
-    /// `group_of[i]` is the group of shape `i`: 0 for the world, others for instances. Triangles with
-    /// corners that are not finite must have been dropped before.
+    /// `group_of[i]` is the group of shape `i`: 0 for the world, others for instances. A mesh that deforms has a group of
+    /// its own. Triangles with corners that are not finite must have been dropped before.
     pub fn new(
         shapes: Vec<Arc<Geometry>>,
         group_of: &[u32],
@@ -192,23 +209,31 @@ impl Tracer {
         }
         let mut cache = CacheUse::default();
         let mut group = |of: &[u32], instances: Option<&[Bounds]>| {
-            let (group, used) = Group::new(Members::new(&shapes, of, instances), &recipe);
+            let deforming = match of {
+                [shape] if instances.is_none() => Group::deforming(&shapes, *shape, &recipe),
+                _ => None,
+            };
+            let (group, used) = deforming
+                .unwrap_or_else(|| Group::new(Members::new(&shapes, of, instances), &recipe));
             cache.add(used);
             group
         };
         let groups = shapes_of[1..].iter().map(|of| group(of, None));
         let mut groups: Vec<Group> = groups.collect();
         let instance_bounds: Vec<Bounds> = (instances.par_iter())
-            .map(|Instance { to_world, group }| groups[*group as usize - 1].bounds_in(to_world))
+            .map(|Instance { to_world, group }| {
+                groups[*group as usize - 1].bounds_in(to_world, recipe.shutter)
+            })
             .collect();
         let world = group(&shapes_of[0], Some(&instance_bounds));
         groups.insert(0, world);
-        let inner = groups[1..].iter().map(|group| group.tree().levels());
+        let inner = groups[1..].iter().map(Group::levels);
         Self {
             shapes,
             instances,
             instance_bounds,
             inner_levels: inner.max().unwrap_or(0),
+            deforms: groups.iter().any(Group::deforms),
             is_large: groups.iter().map(Group::bytes).sum::<usize>() > CACHED,
             groups,
             method: recipe.method,
@@ -259,10 +284,31 @@ impl Tracer {
         if hit.instance == Hit::NONE {
             return shape.interaction(ray, hit);
         }
-        let to_world = &self.instances[hit.instance as usize].to_world;
+        let to_world = self.instances[hit.instance as usize].to_world.at(ray.time);
         shape
-            .interaction(&to_local(to_world, ray), hit)
-            .transformed(to_world, ray.direction)
+            .interaction(&local(&to_world, ray), hit)
+            .transformed(&to_world, ray.direction)
+    }
+
+    /// Where the point at `at`, which `hit` has met, is at another time; world space.
+    pub fn position_at(&self, hit: &Hit, at: &Interaction<'_>, time: f32) -> Vec3 {
+        let Some(Instance { to_world, .. }) = self.instances.get(hit.instance as usize) else {
+            return at.position;
+        };
+        let local = match self.shapes.get(hit.shape) {
+            Geometry::Deforming(mesh) => {
+                mesh.position(hit.primitive, Vec2::new(hit.u, hit.v), time)
+            }
+            _ if to_world.is_still() => return at.position,
+            _ => to_world.at(at.time).inverse().point(at.position),
+        };
+        to_world.at(time).point(local)
+    }
+
+    /// Whether anything moves.
+    pub fn moves(&self) -> bool {
+        let moves = |instance: &Instance| !instance.to_world.is_still();
+        self.deforms || self.instances.iter().any(moves)
     }
 
     /// Primitives, each instance's counted once.
@@ -290,8 +336,18 @@ impl Tracer {
 /// costs a tenth.
 const CACHED: usize = 16 << 20;
 
+/// The ray in an instance's space, as it stands at the ray's time.
+#[inline]
+fn to_local(to_world: &Moving, ray: &Ray) -> Ray {
+    match to_world {
+        Moving::Still(to_world) => local(to_world, ray),
+        Moving::Keyed(chain) => local(&chain.at(ray.time), ray),
+    }
+}
+
 /// The ray in an instance's space; t keeps its meaning, since the direction is not normalised.
-fn to_local(to_world: &Transform, ray: &Ray) -> Ray {
+#[inline]
+fn local(to_world: &Transform, ray: &Ray) -> Ray {
     let to_local = to_world.inverse();
     Ray {
         origin: to_local.point(ray.origin),
@@ -302,6 +358,8 @@ fn to_local(to_world: &Transform, ray: &Ray) -> Ray {
 
 #[cfg(test)]
 mod instance_tests;
+#[cfg(test)]
+mod motion_tests;
 #[cfg(test)]
 mod surface_tests;
 #[cfg(test)]

@@ -48,7 +48,7 @@ pub(super) fn all(shapes: &[Arc<Geometry>], groups: &[u32], instances: &[Instanc
         let recipe = Recipe {
             method,
             build,
-            cache: None,
+            ..Recipe::default()
         };
         Tracer::new(shapes.to_vec(), groups, instances.to_vec(), recipe)
     };
@@ -107,11 +107,11 @@ fn the_tree_and_brute_force_find_the_same_hits_to_the_bit() {
         [mesh.clone(), mesh, mesh::cube()].map(|m| Arc::new(Geometry::Mesh(TriangleMesh::new(m))));
     let transform = DMat4::from_translation(DVec3::new(0.3, 0.2, -1.0))
         * DMat4::from_scale(DVec3::new(0.5, -2.0, 1.0));
-    let to_world = Transform::new(&transform).unwrap();
+    let to_world = Moving::Still(Transform::new(&transform).unwrap());
     let instances = [
         Instance { to_world, group: 1 },
         Instance {
-            to_world: Transform::IDENTITY,
+            to_world: Moving::IDENTITY,
             group: 1,
         },
     ];
@@ -150,7 +150,7 @@ fn the_work_on_a_tree_changes_no_hit() {
             Recipe {
                 method,
                 build,
-                cache: None,
+                ..Recipe::default()
             },
         );
         let (mut hits, mut counts) = (Vec::new(), Counts::default());
@@ -186,7 +186,7 @@ fn surfaces_with_equations_are_found_alike_in_the_world_and_in_instances() {
         .collect();
     let twice: Vec<_> = shapes.iter().chain(&shapes).cloned().collect();
     let transform = DMat4::from_rotation_x(1.0) * DMat4::from_scale(DVec3::new(1.0, -0.5, 2.0));
-    let to_world = Transform::new(&transform).unwrap();
+    let to_world = Moving::Still(Transform::new(&transform).unwrap());
     let instances = [Instance { to_world, group: 1 }];
     let tracers = all(&twice, &[0, 0, 0, 0, 1, 1, 1, 1], &instances);
     let rays = rays(20_000, &[Vec3::ZERO, Vec3::X, Vec3::new(0.0, 0.4, 0.5)]);
@@ -251,6 +251,7 @@ fn odd_rays_are_answered_alike_by_all() {
         .map(|m| Arc::new(Geometry::Mesh(TriangleMesh::new(m))))
         .into();
     let to_world = Transform::new(&DMat4::from_scale(DVec3::new(-1.0, 0.5, 0.25))).unwrap();
+    let to_world = Moving::Still(to_world);
     let instances = [Instance { to_world, group: 1 }];
     assert!(agree(&all(&grid, &[0, 0, 1], &instances), &odd_rays()) > 800);
 }

@@ -9,7 +9,7 @@ use crate::shape::{Bounds, Geometry};
 use super::boxes::RayBoxes;
 use super::group::Item;
 use super::triangle::Shear;
-use super::wide::{Best, Met, Place, Start, Visit, Walker};
+use super::wide::{Best, Met, Needs, Place, Start, Visit, Walker};
 use super::{Counts, Instance, Method, Order, Tracer, to_local};
 
 /// See the module.
@@ -76,19 +76,17 @@ impl<'t> Walk<'t> {
             rays,
             ledger,
         };
-        let inner_levels = tracer.inner_levels;
         let (tree, kernel, count) = (group.tree(), tracer.kernel, rays.len());
         if order == Order::Coherent && !group.has_instances() {
             tree.packets::<_, ANY>(kernel, &mut party, rays, &mut counts);
             return self.counts.add(&counts);
         }
-        tree.batch::<_, ANY>(
-            kernel,
-            (inner_levels, tracer.is_large),
-            &mut party,
-            count,
-            &mut counts,
-        );
+        let needs = Needs {
+            inner_levels: tracer.inner_levels,
+            fetch: tracer.is_large,
+            later: tracer.deforms,
+        };
+        tree.batch::<_, ANY>(kernel, needs, &mut party, count, &mut counts);
         self.counts.add(&counts);
     }
 
@@ -155,24 +153,29 @@ impl<'t> Walk<'t> {
         best: &mut Hit,
     ) -> bool {
         self.counts.primitive_tests += 1;
-        let (t, u, v, bounds) = match self.tracer.shapes.get(item.shape) {
-            Geometry::Mesh(mesh) => {
-                let corners = mesh.corners(item.index);
+        let geometry = self.tracer.shapes.get(item.shape);
+        let corners = match geometry {
+            Geometry::Mesh(mesh) => Some(mesh.corners(item.index)),
+            Geometry::Deforming(mesh) => Some(mesh.corners(item.index, mesh.moment(ray.time))),
+            _ => None,
+        };
+        let (t, u, v, bounds) = match corners {
+            Some(corners) => {
                 let Some((t, u, v)) = shear.intersect(corners, best.t) else {
                     return false;
                 };
                 let bounds = corners.into_iter().fold(Bounds::EMPTY, Bounds::with);
                 (t, u, v, bounds)
             }
-            other => {
+            None => {
                 let limited = Ray {
                     t_max: best.t,
                     ..*ray
                 };
-                let Some((t, u, v)) = other.intersect(item.index, &limited) else {
+                let Some((t, u, v)) = geometry.intersect(item.index, &limited) else {
                     return false;
                 };
-                (t, u, v, other.bounds(item.index))
+                (t, u, v, geometry.bounds(item.index))
             }
         };
         // Never before the boxes that lead here: so no order of walking can miss it.
@@ -311,13 +314,16 @@ impl<'t, L: Ledger + ?Sized, const ANY: bool> Party<'_, 't, '_, L, ANY> {
         } else {
             self.best(&self.ledger.hit(visit.ray), instance)
         };
+        let ray = &self.rays[visit.ray];
+        let (tree, part) = tracer.groups[*group as usize].tree_at(&tracer.shapes, ray.time);
         let start = Start {
-            ray: to_local(to_world, &self.rays[visit.ray]),
+            ray: to_local(to_world, ray),
             instance,
             entry: visit.reached,
+            part,
             best,
         };
-        Met::Instance(tracer.groups[*group as usize].tree(), start)
+        Met::Instance(tree, start)
     }
 
     /// Meets a primitive that is no triangle.
@@ -346,6 +352,7 @@ impl<'t, L: Ledger + ?Sized, const ANY: bool> Walker<'t> for Party<'_, 't, '_, L
             ray: self.rays[ray],
             instance: self.way.instance,
             entry: self.way.entry,
+            part: 0.0,
             best: self.best(&self.ledger.hit(ray), self.way.instance),
         }
     }

@@ -26,6 +26,13 @@ pub(super) struct ImageArguments {
     /// Render N spectral bands over 360-830 nm instead of RGB; the image's RGB is made from them
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=32), help_heading = IMAGE)]
     pub(super) bands: Option<u8>,
+    /// When the shutter is open, in place of the scene's shutter_open and shutter_close: two times, or degrees of a
+    /// frame, which is 360. In --frames the times begin with the frame's, its number divided by --fps
+    #[arg(long, value_name = "OPEN,CLOSE|DEGREES", value_parser = parse::shutter, allow_hyphen_values = true, help_heading = IMAGE)]
+    shutter: Option<parse::Shutter>,
+    /// Frames in a unit of the scene's time
+    #[arg(long, default_value_t = 24.0, value_name = "N", value_parser = parse::positive, help_heading = IMAGE)]
+    fps: f64,
     #[command(flatten)]
     method: MethodArguments,
 }
@@ -55,8 +62,19 @@ impl ImageArguments {
             spp: self.spp,
             size: self.size,
             crop: self.crop,
+            shutter: self.shutter(0),
             ..self.method.overrides()
         }
+    }
+
+    /// When the shutter of a frame is open, if that is said.
+    pub(super) fn shutter(&self, frame: i64) -> Option<(f64, f64)> {
+        Some(self.shutter?.times(frame, self.fps))
+    }
+
+    /// Frames in a unit of time.
+    pub(super) fn fps(&self) -> f64 {
+        self.fps
     }
 
     /// RGB or bands.

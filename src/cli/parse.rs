@@ -163,6 +163,48 @@ pub(super) fn bytes(text: &str) -> Parsed<u64> {
     Ok((number * factor) as u64)
 }
 
+/// When the shutter is open.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Shutter {
+    /// From and to; of a frame, after its time.
+    Times(f64, f64),
+    /// For so much of a frame, which is 360 degrees.
+    Degrees(f64),
+}
+
+impl Shutter {
+    /// From when to when of frame `frame`, whose time is its number over `fps`.
+    pub(super) fn times(self, frame: i64, fps: f64) -> (f64, f64) {
+        let begin = frame as f64 / fps;
+        match self {
+            Self::Times(open, close) => (begin + open, begin + close),
+            Self::Degrees(degrees) => (begin, (frame as f64 + degrees / 360.0) / fps),
+        }
+    }
+}
+
+/// `0,0.5` or `180`
+pub(super) fn shutter(text: &str) -> Parsed<Shutter> {
+    const HOW: &str = "write it as OPEN,CLOSE, such as 0,0.5, or in degrees, such as 180";
+    let numbers: Option<Vec<f64>> = text.split(',').map(|t| t.trim().parse().ok()).collect();
+    match numbers.as_deref() {
+        Some([degrees]) if (0.0..=360.0).contains(degrees) => Ok(Shutter::Degrees(*degrees)),
+        Some([degrees]) => Err(format!(
+            "{degrees} degrees are not between 0 and 360; {HOW}"
+        )),
+        Some([open, close])
+            if open.abs().max(close.abs()) > 1e9 || open.is_nan() || close.is_nan() =>
+        {
+            Err(format!("{text} is not between -1e9 and 1e9"))
+        }
+        Some([open, close]) if close < open => {
+            Err(format!("it closes at {close}, before it opens at {open}"))
+        }
+        Some([open, close]) => Ok(Shutter::Times(*open, *close)),
+        _ => Err(HOW.to_owned()),
+    }
+}
+
 /// Numbers of frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Frames {
@@ -239,6 +281,20 @@ mod tests {
             "-9223372036854775808:0",
         ] {
             assert!(list(wrong).is_err(), "{wrong:?}");
+        }
+    }
+
+    #[test]
+    fn a_shutter_is_open_between_two_times_or_for_a_part_of_a_frame() {
+        let times = |text: &str| shutter(text).map(|shutter| shutter.times(6, 24.0));
+        assert_eq!(times("180"), Ok((0.25, 6.5 / 24.0)));
+        assert_eq!(times("0"), Ok((0.25, 0.25)));
+        assert_eq!(times("-1, 0.5"), Ok((-0.75, 0.75)));
+        assert_eq!(times("0.5,0.5"), Ok((0.75, 0.75)));
+        for wrong in [
+            "", "a", "361", "-1", "NaN", "1,0", "0,inf", "NaN,1", "0,1,2",
+        ] {
+            assert!(times(wrong).is_err(), "{wrong:?}");
         }
     }
 

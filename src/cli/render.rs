@@ -11,7 +11,7 @@ use etendue::display;
 use etendue::error::{Error, Problem, Result};
 use etendue::image;
 use etendue::render::{
-    Adaptive, Checkpoint, Options, Progress, Rendered, Session, is_mesh, sensors,
+    Adaptive, Checkpoint, Options, Overrides, Progress, Rendered, Session, is_mesh, sensors,
 };
 use glam::DVec3;
 
@@ -23,7 +23,8 @@ use super::progress::Bar;
 use super::scene::SceneArguments;
 use super::stop::Stop;
 use super::summary::{self, Ending, Style};
-use super::{output, report, status, turntable};
+use super::turntable::{self, Orbit};
+use super::{output, report, status};
 
 /// Render scenes or meshes to images
 ///
@@ -313,12 +314,30 @@ impl Series<'_> {
         let sensor = sensors(&description).get(item.sensor).copied();
         let turned = self.arguments.turntable.zip(item.frame).zip(sensor);
         let mut posed = None;
+        let shutter = self.arguments.image.shutter(item.frame.unwrap_or(0));
+        if let (Some(_), Some(_)) = (shutter, item.frame) {
+            let overrides = Overrides {
+                shutter,
+                ..Overrides::default()
+            };
+            overrides.apply(posed.insert(description.clone()));
+        }
         if let Some(((count, frame), sensor)) = turned {
             let bounds = self.session.bounds(&description, options, bar)?;
             let pivot = self.arguments.pivot;
             let center = pivot.unwrap_or_else(|| turntable::pivot(&description, sensor, &bounds));
-            let turns = frame as f64 / f64::from(count);
-            turntable::turn(posed.insert(description.clone()), sensor, center, turns);
+            let speed = self.arguments.image.fps() / f64::from(count);
+            let orbit = Orbit {
+                center,
+                turns: match shutter {
+                    Some((open, _)) => open * speed,
+                    None => frame as f64 / f64::from(count),
+                },
+                speed,
+                shutter,
+            };
+            let posed = posed.get_or_insert_with(|| description.clone());
+            orbit.place(posed, sensor);
         }
         let seen = posed.as_ref().unwrap_or(&description);
         let mut rendered = self.session.render(seen, options, bar);

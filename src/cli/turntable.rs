@@ -17,24 +17,59 @@ pub(super) fn pivot(description: &Description, sensor: NodeId, bounds: &Bounds) 
     target.unwrap_or_else(center)
 }
 
-/// Turns the sensor by `turns` (1 is all around) about `center`, counter-clockwise as seen from above.
-pub(super) fn turn(description: &mut Description, sensor: NodeId, center: DVec3, turns: f64) {
-    let turns = turns.rem_euclid(1.0);
-    if turns == 0.0 {
-        return;
+/// A way around a point, counter-clockwise as seen from above.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Orbit {
+    pub(super) center: DVec3,
+    /// How far it has come when the shutter opens, or at the frame's time; 1 is all around.
+    pub(super) turns: f64,
+    /// Turns in a unit of time.
+    pub(super) speed: f64,
+    /// When the frame's shutter opens and closes; where absent the camera does not move in a frame.
+    pub(super) shutter: Option<(f64, f64)>,
+}
+
+/// Between two keyframes of a turn, in turns: the camera goes straight from one to the next, and strays from the circle
+/// by 10⁻⁵ of its radius.
+const STEP: f64 = 1.0 / 360.0;
+/// Keyframes of a frame.
+const MOST_STEPS: f64 = 1e4;
+
+impl Orbit {
+    /// Puts the sensor on its way.
+    pub(super) fn place(&self, description: &mut Description, sensor: NodeId) {
+        let begin = self.turns.rem_euclid(1.0);
+        let set = |description: &mut Description, value| description.set(sensor, "to_world", value);
+        let pose = match description.get(sensor, "to_world") {
+            Some(Value::Animation(keyframes)) => {
+                let rotation = rotation(&keyframes[0].1, self.center, begin);
+                let turned = keyframes
+                    .iter()
+                    .map(|(time, pose)| (*time, rotation * *pose));
+                let turned = Value::Animation(turned.collect());
+                return set(description, turned);
+            }
+            Some(Value::Transform(pose)) => *pose,
+            _ => DMat4::IDENTITY,
+        };
+        let turned = |turns: f64| rotation(&pose, self.center, turns) * pose;
+        let moves = self.shutter.filter(|(open, close)| open < close);
+        let Some((open, close)) = moves else {
+            if begin != 0.0 {
+                set(description, Value::Transform(turned(begin)));
+            }
+            return;
+        };
+        let steps = (self.speed * (close - open) / STEP)
+            .ceil()
+            .clamp(1.0, MOST_STEPS);
+        let keyframe = |step: f64| {
+            let after = (close - open) * step / steps;
+            (open + after, turned(begin + self.speed * after))
+        };
+        let keyframes = (0..=steps as u32).map(|step| keyframe(step.into()));
+        set(description, Value::Animation(keyframes.collect()));
     }
-    let turned = match description.get(sensor, "to_world") {
-        Some(Value::Animation(keyframes)) => {
-            let rotation = rotation(&keyframes[0].1, center, turns);
-            let turned = keyframes
-                .iter()
-                .map(|(time, pose)| (*time, rotation * *pose));
-            Value::Animation(turned.collect())
-        }
-        Some(Value::Transform(pose)) => Value::Transform(rotation(pose, center, turns) * *pose),
-        _ => Value::Transform(rotation(&DMat4::IDENTITY, center, turns)),
-    };
-    description.set(sensor, "to_world", turned);
 }
 
 fn rotation(pose: &DMat4, center: DVec3, turns: f64) -> DMat4 {
@@ -65,6 +100,37 @@ mod tests {
 
     use super::*;
 
+    fn orbit(center: DVec3, turns: f64, shutter: Option<(f64, f64)>) -> Orbit {
+        Orbit {
+            center,
+            turns,
+            speed: 1.0,
+            shutter,
+        }
+    }
+
+    #[test]
+    fn while_the_shutter_is_open_the_camera_goes_on_around() {
+        let text = "<scene version='3.0.0'><sensor type='perspective'><transform name='to_world'>
+            <lookat origin='0, 0, 4' target='0, 0, 0' up='0, 1, 0'/></transform></sensor></scene>";
+        let mut scene =
+            Description::parse(text, Path::new("test.xml"), &Options::default()).unwrap();
+        let sensor = scene.children_of(scene.root().node_id(), Kind::Sensor)[0];
+        orbit(DVec3::ZERO, 0.25, Some((7.0, 7.25))).place(&mut scene, sensor);
+        let Some(Value::Animation(keyframes)) = scene.get(sensor, "to_world") else {
+            panic!("it moves")
+        };
+        let at = |i: usize| (keyframes[i].0, keyframes[i].1.w_axis.truncate());
+        let last = keyframes.len() - 1;
+        let [first, last] = [at(0), at(last)];
+        assert_eq!((first.0, last.0), (7.0, 7.25));
+        assert!(first.1.distance(DVec3::new(4.0, 0.0, 0.0)) < 1e-9);
+        assert!(last.1.distance(DVec3::new(0.0, 0.0, -4.0)) < 1e-9);
+        let moving = etendue::math::Moving::new(keyframes).unwrap();
+        let radius = moving.at(7.1234).translation().length();
+        assert!((radius - 4.0).abs() < 1e-4, "{radius}");
+    }
+
     fn turned(to_world: &str, turns: f64) -> DMat4 {
         let text = format!(
             "<scene version='3.0.0'><sensor type='perspective'>{to_world}</sensor></scene>"
@@ -77,7 +143,7 @@ mod tests {
             max: Vec3::new(2.0, 5.0, 1.0),
         };
         let center = pivot(&scene, sensor, &bounds);
-        turn(&mut scene, sensor, center, turns);
+        orbit(center, turns, None).place(&mut scene, sensor);
         match scene.get(sensor, "to_world") {
             Some(Value::Transform(pose)) => *pose,
             other => panic!("{other:?}"),

@@ -25,6 +25,8 @@ pub(super) struct Order {
     pub(super) crop: Option<[u32; 4]>,
     /// In place of the sampler's count.
     pub(super) spp: Option<u32>,
+    /// In place of the sensor's `shutter_open` and `shutter_close`.
+    pub(super) shutter: Option<(f64, f64)>,
     /// Sampler plugin.
     pub(super) sampler: Option<String>,
     /// Integrator plugin.
@@ -61,6 +63,7 @@ impl Order {
             sampler: self.sampler.clone(),
             size: self.size,
             crop: self.crop.map(crop),
+            shutter: self.shutter,
             integrator: self.integrator.clone(),
             max_depth: self.max_depth,
         }

@@ -75,6 +75,7 @@ pub fn crosscheck(
         size: overrides.size,
         crop: overrides.crop.map(|w| [w.x, w.y, w.width, w.height]),
         spp: overrides.spp,
+        shutter: overrides.shutter,
         sampler: overrides.sampler.clone(),
         integrator: overrides.integrator.clone(),
         max_depth: overrides.max_depth,

@@ -7,9 +7,11 @@ line. Each gets one line of JSON on standard output: {"loaded": …} or {"refuse
 import importlib.util
 import json
 import os
+import random
 import sys
 import time
 from pathlib import Path
+from xml.etree import ElementTree
 
 TAGS = {'ReconstructionFilter': 'rfilter', 'PhaseFunction': 'phase'}
 
@@ -68,6 +70,88 @@ def import_plugins(mi, folder, own):
     return kinds
 
 
+class Motion:
+    """The keyframes of a scene, which Mitsuba 3.9 does not read. It renders the scene as it stands at one time after
+    another, for what `<animation>` says at that time takes its place in the text."""
+
+    NAME = 'etendue_motion_'
+
+    def __init__(self, mi, order):
+        import numpy
+        self.mi, self.numpy, self.config = mi, numpy, mi.parser.ParserConfig(order['variant'])
+        root = ElementTree.parse(order['scene']).getroot()
+        self.values = {e.get('name'): e.get('value') for e in root.iter('default')} | dict(order['defines'])
+        self.tracks = []
+        for parent in list(root.iter()):
+            for place, element in enumerate(list(parent)):
+                if element.tag != 'animation':
+                    continue
+                self.tracks.append([(float(self.filled(frame.get('time'))), self.pose(frame, root.get('version')))
+                                    for frame in element])
+                still = ElementTree.Element('transform', name=element.get('name'))
+                ElementTree.SubElement(still, 'matrix', value=f'${self.NAME}{len(self.tracks) - 1}')
+                parent[place] = still
+        self.text = ElementTree.tostring(root, encoding='unicode')
+
+    def filled(self, text):
+        """A text with its parameters' values."""
+        for name in sorted(self.values, key=len, reverse=True):
+            text = text.replace('$' + name, self.values[name])
+        return text
+
+    def pose(self, frame, version):
+        """Scale, rotation as a quaternion, and translation of a keyframe, whose operations Mitsuba reads itself."""
+        np = self.numpy
+        operations = ''.join(ElementTree.tostring(e, encoding='unicode') for e in frame)
+        text = (f'<scene version="{version}"><emitter type="point"><transform name="to_world">'
+                f'{self.filled(operations)}</transform></emitter></scene>')
+        state = self.mi.parser.parse_string(self.config, text)
+        points = [node.props for node in state.nodes if node.props.plugin_name() == 'point']
+        matrix = np.array(points[0]['to_world'].matrix, dtype=float).reshape(4, 4)
+        left, _, right = np.linalg.svd(matrix[:3, :3])
+        rotation = left @ right
+        if np.linalg.det(rotation) < 0:
+            rotation = -rotation
+        scale = rotation.T @ matrix[:3, :3]
+        # The eigenvector of the largest eigenvalue (Bar-Itzhack, 2000).
+        (a, b, c), (d, e, f), (g, h, i) = rotation
+        k = np.array([[a - e - i, d + b, g + c, h - f], [d + b, e - a - i, h + f, c - g],
+                      [g + c, h + f, i - a - e, d - b], [h - f, c - g, d - b, a + e + i]])
+        x, y, z, w = np.linalg.eigh(k)[1][:, -1]
+        return scale, np.array([w, x, y, z]), matrix[:3, 3]
+
+    def matrix(self, track, time):
+        """A track's matrix at a time, as text."""
+        np = self.numpy
+        times = [t for t, _ in track]
+        last = len(track) - 1
+        key = min(max(int(np.searchsorted(times, time, side='right')) - 1, 0), max(last - 1, 0))
+        following = min(key + 1, last)
+        span = times[following] - times[key]
+        part = min(max((time - times[key]) / span, 0.0), 1.0) if span > 0 else 0.0
+        (scale0, turn0, move0), (scale1, turn1, move1) = track[key][1], track[following][1]
+        cosine = float(turn0 @ turn1)
+        turn1, cosine = (-turn1, -cosine) if cosine < 0 else (turn1, cosine)
+        angle = np.arccos(min(cosine, 1.0))
+        if angle < 1e-6:
+            turn = turn0 + (turn1 - turn0) * part
+        else:
+            turn = (np.sin((1 - part) * angle) * turn0 + np.sin(part * angle) * turn1) / np.sin(angle)
+        w, x, y, z = turn / np.linalg.norm(turn)
+        rotation = np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+                             [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+                             [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]])
+        matrix = np.identity(4)
+        matrix[:3, :3] = rotation @ (scale0 + (scale1 - scale0) * part)
+        matrix[:3, 3] = move0 + (move1 - move0) * part
+        return ' '.join(repr(float(value)) for value in matrix.flatten())
+
+    def at(self, order, time):
+        """The order for the scene as it stands at a time, and the scene's text."""
+        values = [[f'{self.NAME}{i}', self.matrix(track, time)] for i, track in enumerate(self.tracks)]
+        return {**order, 'defines': order['defines'] + values, 'text': self.text}
+
+
 class Parsed:
     """A scene file as Mitsuba's parser leaves it, before anything is built. Nodes are known by number."""
 
@@ -75,7 +159,10 @@ class Parsed:
         self.mi, self.variant, self.added = mi, order['variant'], added
         mi.file_resolver().prepend(str(Path(order['scene']).resolve().parent))
         self.config = mi.parser.ParserConfig(order['variant'])
-        self.state = mi.parser.parse_file(self.config, order['scene'], **dict(order['defines']))
+        if 'text' in order:
+            self.state = mi.parser.parse_string(self.config, order['text'], **dict(order['defines']))
+        else:
+            self.state = mi.parser.parse_file(self.config, order['scene'], **dict(order['defines']))
         mi.parser.transform_upgrade(self.config, self.state)
         mi.parser.transform_resolve(self.config, self.state)
         self.notes = []
@@ -157,6 +244,8 @@ class Parsed:
                 integrator = self.children(integrator, 'Integrator')[0]
             self.props(integrator)['max_depth'] = order['max_depth']
         for sensor in self.children(root, 'Sensor'):
+            if order['shutter'] is not None:
+                self.props(sensor)['shutter_open'], self.props(sensor)['shutter_close'] = order['shutter']
             film = self.child(sensor, 'Film', 'hdrfilm')
             if order['size'] is not None:
                 self.props(film)['width'], self.props(film)['height'] = order['size']
@@ -246,6 +335,67 @@ def write(bitmap, path):
         drjit.set_thread_count(count)
 
 
+# As many times of a shutter are rendered as there are samples a pixel, and no more than that.
+MOST_TIMES = 256
+
+
+class Renderer:
+    """A scene in memory; where it moves, as it stands at one time after another."""
+
+    def __init__(self, mi, order, added):
+        self.mi, self.order, self.added = mi, order, added
+        self.motion = None
+        if '<animation' in Path(order['scene']).read_text(encoding='utf-8'):
+            try:
+                self.motion = Motion(mi, order)
+            except ModuleNotFoundError as error:
+                raise Refused(f'a scene that moves needs the Python package {error.name}') from error
+        self.scene, self.chosen, self.notes = self.load(0.0)
+        self.spp = self.sensor().sampler().sample_count()
+        self.times = 1
+        if self.motion is not None:
+            shutter = self.shutter()
+            while shutter[0] < shutter[1] and self.times < MOST_TIMES and self.spp % (2 * self.times) == 0:
+                self.times *= 2
+            self.notes.append(f'Mitsuba renders the scene at {self.times} times and takes the mean')
+
+    def load(self, time, times=1):
+        order = self.order if self.motion is None else self.motion.at(self.order, time)
+        if times > 1:
+            order = {**order, 'spp': self.spp // times}
+        return load(self.mi, order, self.added)
+
+    def sensor(self):
+        return self.scene.sensors()[self.chosen]
+
+    def shutter(self):
+        opened = self.sensor().shutter_open()
+        return opened, opened + self.sensor().shutter_open_time()
+
+    def render(self, seed):
+        if self.motion is None:
+            return self.still(seed)
+        opened, closed = self.shutter()
+        draw = random.Random(seed)
+        total = None
+        for number in range(self.times):
+            time = opened + (closed - opened) * (number + draw.random()) / self.times
+            self.scene, self.chosen, _ = self.load(time, self.times)
+            bitmap = self.still((seed * self.times + number) % 2**32)
+            # Sums and weights: the mean of quotients would be another thing.
+            raw = self.motion.numpy.array(self.sensor().film().bitmap(raw=True), dtype=float)
+            total = raw if total is None else total + raw
+        image = (total[..., :-1] / total[..., -1:]).astype('float32')
+        names = [field.name for field in bitmap.struct_()]
+        if image.shape[-1] != len(names):
+            raise Refused('a scene that moves cannot be put together from these channels')
+        return self.mi.Bitmap(image, pixel_format=bitmap.pixel_format(), channel_names=names)
+
+    def still(self, seed):
+        self.scene.integrator().render(self.scene, sensor=self.chosen, seed=seed, develop=False)
+        return self.sensor().film().bitmap()
+
+
 def main():
     # What Mitsuba prints goes to standard error: the answers have the standard output to themselves.
     answers = os.fdopen(os.dup(1), 'w', encoding='utf-8')
@@ -269,22 +419,19 @@ def main():
 
     clock = Clock()
     try:
-        scene, chosen, notes = load(mi, order, added)
+        renderer = Renderer(mi, order, added)
     except Refused as error:
         return answer('refused', str(error))
     answer('loaded', dict(renderer=f'Mitsuba {mi.__version__}, {order["variant"]}', time=clock.time(),
-                          notes=notes))
-    sensor, integrator = scene.sensors()[chosen], scene.integrator()
-    film, spp = sensor.film(), sensor.sampler().sample_count()
+                          notes=renderer.notes))
     for line in sys.stdin:
         seed = int(line)
         clock = Clock()
-        integrator.render(scene, sensor=chosen, seed=seed, develop=False)
-        bitmap = film.bitmap()
+        bitmap = renderer.render(seed)
         taken = clock.time()
         path = str(Path(order['folder']) / f'mitsuba-{seed}.exr')
         write(bitmap, path)
-        answer('rendered', dict(image=path, spp=spp, time=taken))
+        answer('rendered', dict(image=path, spp=renderer.spp, time=taken))
 
 
 if __name__ == '__main__':

@@ -54,6 +54,8 @@ pub enum Takes {
     Vector,
     /// `<transform>`
     Transform,
+    /// `<transform>` or `<animation>`
+    Motion,
     /// A number, `<rgb>` or `<spectrum>`.
     Color,
     /// A colour, or a nested texture of colours.
@@ -185,6 +187,7 @@ impl fmt::Display for Takes {
             Self::File => f.write_str("file"),
             Self::Vector => f.write_str("point or vector"),
             Self::Transform => f.write_str("transform"),
+            Self::Motion => f.write_str("transform or animation"),
             Self::Color => f.write_str("color"),
             Self::Texture => f.write_str("color or texture"),
             Self::Number => f.write_str("float or texture"),
@@ -343,6 +346,11 @@ pub const fn vector(name: &'static str, preset: [f64; 3], about: &'static str) -
 /// A `<transform>`.
 pub const fn transform(name: &'static str, about: &'static str) -> Row {
     Row::new(name, Takes::Transform, Preset::Identity, about)
+}
+
+/// A `<transform>`, or an `<animation>` of several.
+pub const fn motion(name: &'static str, about: &'static str) -> Row {
+    Row::new(name, Takes::Motion, Preset::Identity, about)
 }
 
 /// A colour that is the same everywhere.

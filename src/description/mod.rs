@@ -225,6 +225,13 @@ pub struct Description {
 }
 
 impl Description {
+    /// Whether the `to_world` of a shape is an animation.
+    pub fn has_motion(&self) -> bool {
+        let moves = |property: &Property| matches!(property.value, Value::Animation(_));
+        let mut shapes = self.nodes.iter().filter(|node| node.kind == Kind::Shape);
+        shapes.any(|shape| shape.properties.iter().any(moves))
+    }
+
     /// The texts that the description was read from: the scene, what it includes, and files of spectra; each once.
     pub fn sources(&self) -> &[PathBuf] {
         &self.sources

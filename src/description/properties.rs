@@ -9,9 +9,13 @@ use glam::{DMat4, DVec3};
 use super::declared::{Plugin, Preset, Row, Short, Takes};
 use super::{Description, Kind, Node, NodeId, Property, Value};
 use crate::error::{Error, Location, Result};
+use crate::math::{Moving, Transform};
 
 /// Why what is Étendue's own is refused.
 pub(crate) const STRICT: &str = "Mitsuba 3 would not read it, which --strict refuses";
+
+/// What a transform that may move is, in words.
+const MOTION: &str = "a transform or an animation";
 
 /// A view of one node, with the table of the plugin that reads it.
 #[derive(Clone, Copy, Debug)]
@@ -312,14 +316,34 @@ impl<'a> Properties<'a> {
         })
     }
 
-    /// An `<animation>`: (time, transform), times strictly increasing. A `<transform>` counts as one keyframe at
-    /// time 0.
-    pub fn animation(&self, name: &str) -> Result<Option<Vec<(f64, DMat4)>>> {
-        self.typed(name, "an animation or a transform", |value| match *value {
-            Value::Animation(ref keyframes) => Some(keyframes.clone()),
-            Value::Transform(m) => Some(vec![(0.0, m)]),
+    /// The keyframes of an `<animation>`: (time, transform), times strictly increasing; `None` where there is a
+    /// `<transform>` or nothing.
+    pub fn animation(&self, name: &str) -> Result<Option<&'a [(f64, DMat4)]>> {
+        self.row(name);
+        let keyframes = self.typed(name, MOTION, |value| match value {
+            Value::Animation(keyframes) => Some(Some(&keyframes[..])),
+            Value::Transform(_) => Some(None),
             _ => None,
-        })
+        })?;
+        Ok(keyframes.flatten())
+    }
+
+    /// A `<transform>` or an `<animation>`, or what is declared: affine and invertible at all times.
+    ///
+    /// # Errors
+    /// Where it is not.
+    pub fn motion(&self, name: &str) -> Result<Moving> {
+        match self.animation(name)? {
+            Some(keyframes) => {
+                Moving::new(keyframes).map_err(|why| self.error(name, why.to_string()))
+            }
+            None => {
+                let still = Transform::new(&self.transform(name)?);
+                still
+                    .map(Moving::Still)
+                    .ok_or_else(|| self.error(name, "the transform must be affine and invertible"))
+            }
+        }
     }
 
     /// The existing file that a `<string>` names, looked for in the `<path>` folders, then in the folder of the scene
@@ -472,7 +496,7 @@ mod tests {
 
     use super::*;
     use crate::description::Options;
-    use crate::description::declared::{choice, file, float, integer, string};
+    use crate::description::declared::{choice, file, float, integer, motion, string};
 
     static TABLE: Plugin = Plugin {
         about: "a plugin of these tests",
@@ -484,6 +508,7 @@ mod tests {
             string("name", "nobody", ""),
             choice("side", &["Left", "right"], ""),
             file("filename", "the mesh"),
+            motion("to_world", ""),
         ]],
     };
 
@@ -526,14 +551,21 @@ mod tests {
     }
 
     #[test]
-    fn a_transform_serves_as_an_animation_of_one_keyframe() {
-        let scene = scene(
-            "<shape type='a'><transform name='to_world'><translate x='2'/></transform></shape>",
-        );
-        let shape = shape(&scene);
-        let keyframes = shape.animation("to_world").unwrap().unwrap();
-        assert_eq!(keyframes.len(), 1);
-        assert_eq!(keyframes[0].1.w_axis.x, 2.0);
+    fn a_transform_stands_still_and_keyframes_make_a_motion() {
+        let at = |inside: &str, time: f32| {
+            let scene = scene(&format!("<shape type='a'>{inside}</shape>"));
+            let moving = shape(&scene).motion("to_world").unwrap();
+            (moving.is_still(), moving.at(time).translation().x)
+        };
+        let still = "<transform name='to_world'><translate x='2'/></transform>";
+        assert_eq!(at("", 3.0), (true, 0.0));
+        assert_eq!(at(still, 3.0), (true, 2.0));
+        let keyframe =
+            |time, x| format!("<transform time='{time}'><translate x='{x}'/></transform>");
+        let animation = |frames: &str| format!("<animation name='to_world'>{frames}</animation>");
+        assert_eq!(at(&animation(&keyframe(7, 4)), 3.0), (true, 4.0));
+        let two = animation(&(keyframe(1, 4) + &keyframe(5, 8)));
+        assert_eq!(at(&two, 3.0), (false, 6.0));
     }
 
     #[test]

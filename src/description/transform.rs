@@ -8,6 +8,10 @@ use super::defines::Defines;
 use super::element::{Element, File};
 use super::values::{number, numbers, vector, xyz};
 use crate::error::{Error, Result};
+use crate::math::moving::{Pose, Unmovable};
+
+/// Times that single precision can hold.
+const LATEST: f64 = 1e30;
 
 const OPERATIONS: [&str; 5] = ["translate", "rotate", "scale", "lookat", "matrix"];
 
@@ -45,12 +49,13 @@ impl Reading<'_, '_> {
         Ok(product)
     }
 
-    /// The keyframes inside `element`.
+    /// The keyframes inside `element`, which make a motion.
     pub(super) fn animation(&mut self, element: &Element<'_>) -> Result<Vec<(f64, DMat4)>> {
         if self.strict {
             return Err(element.error("Mitsuba 3.9 has no <animation>"));
         }
         let mut keyframes: Vec<(f64, DMat4)> = Vec::new();
+        let mut last_pose: Option<Pose> = None;
         for child in element.children() {
             let child = Element::open(child, &self.file.lines, self.defines)?;
             if child.tag != "transform" {
@@ -62,6 +67,10 @@ impl Reading<'_, '_> {
             child.only(&["time"])?;
             let time = number(child.required("time")?.trim())
                 .map_err(|e| e.at(child.attribute_location("time")))?;
+            if time.abs() > LATEST {
+                let message = format!("the time {time} is not between {LATEST:e} and its opposite");
+                return Err(child.attribute_error("time", message));
+            }
             if let Some(&(last, _)) = keyframes.last()
                 && time <= last
             {
@@ -71,11 +80,28 @@ impl Reading<'_, '_> {
                 ));
             }
             let keyframe = self.transform(&child)?;
-            if is_singular(keyframe) {
-                return Err(child
+            let pose = Pose::new(&keyframe).map_err(|why| match why {
+                Unmovable::Sheared(_) => child
+                    .error("a keyframe cannot shear: what lies between two is not clear then")
+                    .help("write a scale before the rotations"),
+                _ => child
                     .error("the transform is singular: it flattens space")
-                    .help("no scale may be 0"));
+                    .help("no scale may be 0"),
+            })?;
+            if let Some(last) = last_pose {
+                if last.mirrors() != pose.mirrors() {
+                    return Err(child
+                        .error("of two keyframes that follow each other one mirrors and the other does not")
+                        .help("between them space would be flat; give both the sign of one"));
+                }
+                if last.is_half_a_turn_from(&pose) {
+                    let warning =
+                        child.error("half a turn between two keyframes: which way is not said");
+                    self.warnings
+                        .push(warning.help("add a keyframe between them"));
+                }
             }
+            last_pose = Some(pose);
             keyframes.push((time, keyframe));
         }
         if keyframes.is_empty() {

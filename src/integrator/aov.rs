@@ -1,7 +1,8 @@
 //! `aov`: what the camera sees beside light, as channels of their own. `aovs` lists them as
 //! `name:kind, …`; nested integrators give the image itself (the first) and, where they have a name,
 //! channels `name.R` and so on; without any it is black and clear. Where the camera sees nothing a channel is 0: shapes
-//! are counted from 1. Emitters that are hidden from light are seen here.
+//! are counted from 1. Emitters that are hidden from light are seen here. `motion`, Étendue's own, is by how many pixels,
+//! to the right and down, what is seen is displaced from when the shutter opens to when it closes.
 
 use std::collections::HashSet;
 
@@ -11,7 +12,7 @@ use crate::color::{ColorModel, Spectral};
 use crate::description::declared::{Plugin, nested, string};
 use crate::description::{Kind, Properties, Property, Value};
 use crate::error::Result;
-use crate::interaction::{Interaction, Ray};
+use crate::interaction::{Hit, Interaction, Ray};
 use crate::sampler::Sampler;
 use crate::scene::Scene;
 use glam::Vec2;
@@ -26,6 +27,7 @@ enum Quantity {
     DuvDx,
     DuvDy,
     GeoNormal,
+    Motion,
     Position,
     PrimIndex,
     ShapeIndex,
@@ -42,6 +44,7 @@ const QUANTITIES: &[(&str, Quantity, &[&str])] = &[
     ("duv_dx", Quantity::DuvDx, &["U", "V"]),
     ("duv_dy", Quantity::DuvDy, &["U", "V"]),
     ("geo_normal", Quantity::GeoNormal, &["X", "Y", "Z"]),
+    ("motion", Quantity::Motion, &["X", "Y"]),
     ("position", Quantity::Position, &["X", "Y", "Z"]),
     ("prim_index", Quantity::PrimIndex, &["I"]),
     ("sh_normal", Quantity::ShNormal, &["X", "Y", "Z"]),
@@ -199,7 +202,7 @@ impl<C: ColorModel> Estimator<C> for Aov<C> {
             for (_, quantity, suffixes) in &self.quantities {
                 let values = at
                     .as_ref()
-                    .map_or([0.0; 3], |at| self.show(*quantity, scene, start, at));
+                    .map_or([0.0; 3], |at| self.show(*quantity, scene, (start, hit), at));
                 estimates.extra.extend_from_slice(&values[..suffixes.len()]);
             }
         }
@@ -212,7 +215,7 @@ impl<C: ColorModel> Aov<C> {
         &self,
         quantity: Quantity,
         scene: &Scene<C>,
-        start: &Start<C>,
+        (start, hit): (&Start<C>, &Hit),
         at: &Interaction<'_>,
     ) -> [f32; 3] {
         match quantity {
@@ -228,12 +231,21 @@ impl<C: ColorModel> Aov<C> {
             Quantity::DuvDx => self.duv(start, at, 0),
             Quantity::DuvDy => self.duv(start, at, 1),
             Quantity::GeoNormal => at.normal.to_array(),
+            Quantity::Motion => self.motion(scene, hit, at),
             Quantity::Position => at.position.to_array(),
             Quantity::PrimIndex => [at.primitive as f32, 0.0, 0.0],
             Quantity::ShapeIndex => [(at.shape + 1) as f32, 0.0, 0.0],
             Quantity::ShNormal => at.frame.n.to_array(),
             Quantity::Uv => [at.uv.x, at.uv.y, 0.0],
         }
+    }
+
+    /// How far what was hit is displaced over the film, in pixels.
+    fn motion(&self, scene: &Scene<C>, hit: &Hit, at: &Interaction<'_>) -> [f32; 3] {
+        let motion = self.footprint.as_ref().map_or(Vec2::ZERO, |footprint| {
+            footprint.motion(|time| scene.tracer().position_at(hit, at, time))
+        });
+        [motion.x, motion.y, 0.0]
     }
 
     /// How texture coordinates change along an axis of the film.

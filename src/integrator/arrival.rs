@@ -56,7 +56,7 @@ impl<C: ColorModel> Arrival<'_, '_, C> {
         let (radiance, light_pdf) = match self.at {
             Some(at) => scene.emitted(at, from, w)?,
             None if self.hides_surroundings => return None,
-            None => scene.surrounding(self.ray.direction, w)?,
+            None => scene.surrounding(self.ray, w)?,
         };
         let weight = self
             .scattered

@@ -180,7 +180,7 @@ impl Bounce<'_> {
         let numbers = block.decisions(decision);
         let (u2, u1) = (numbers.u2::<F>(), numbers.u1::<F>());
         let (at, w) = (&block.at, block.wavelengths);
-        let light = block.scene.sample_lights(at.position, u1, u2, w, at.active);
+        let light = block.scene.sample_lights(at, u1, u2, w);
         let wo = at.frame.to_local(light.direction);
         let value = block.material.eval_lanes(at, at.wi, wo, w);
         let [light_share, bsdf_share] = self.0.shares().map(F::splat);

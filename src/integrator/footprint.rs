@@ -2,7 +2,7 @@
 //! neighbouring points meet the plane that touches the surface, and the steps between these points are written, by
 //! least squares, as steps of u and v. As in Mitsuba a neighbour is a pixel away over the root of the samples in it.
 
-use glam::{DVec3, Vec2};
+use glam::{DVec3, Vec2, Vec3};
 
 use crate::interaction::{Interaction, Ray};
 use crate::sensor::{Film, Sensor};
@@ -13,16 +13,43 @@ pub struct Footprint {
     sensor: Sensor,
     /// In units of the film.
     step: Vec2,
+    /// Of the film in pixels.
+    size: Vec2,
 }
 
 impl Footprint {
     /// Of so many samples a pixel.
     pub fn new(sensor: Sensor, film: &Film, samples: u32) -> Self {
-        let pixel = Vec2::new(film.width as f32, film.height as f32).recip();
+        let size = Vec2::new(film.width as f32, film.height as f32);
         Self {
             sensor,
-            step: pixel / (samples as f32).sqrt(),
+            step: size.recip() / (samples as f32).sqrt(),
+            size,
         }
+    }
+
+    /// By how many pixels, to the right and down, what is at `position` at a time is displaced over the film while the
+    /// shutter is open; 0 where it is behind the camera.
+    pub(super) fn motion(&self, position: impl Fn(f32) -> Vec3) -> Vec2 {
+        let (open, close) = self.sensor.shutter();
+        let [from, to] = [open, close].map(|time| self.place(position(time), time));
+        let motion = to - from;
+        if motion.is_finite() {
+            motion
+        } else {
+            Vec2::ZERO
+        }
+    }
+
+    /// Where a point is seen on the film, in pixels from its left and its top; not a number behind the camera.
+    fn place(&self, position: Vec3, time: f32) -> Vec2 {
+        let to_clip = self.sensor.projection() * self.sensor.world_to_camera(time);
+        let clip = to_clip * position.extend(1.0);
+        let device = match clip.w > 0.0 {
+            true => clip.truncate().truncate() / clip.w,
+            false => Vec2::NAN,
+        };
+        (0.5 + 0.5 * device * Vec2::new(1.0, -1.0)) * self.size
     }
 
     /// The change of (u, v) from one ray to its neighbour to the right and to that below; 0 where there is none.

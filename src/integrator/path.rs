@@ -123,7 +123,7 @@ impl<C: ColorModel> Bounce<'_, C> {
         let numbers = block.decisions(LIGHT);
         let (u2, u1) = (numbers.u2::<F>(), numbers.u1::<F>());
         let (at, w) = (&block.at, block.wavelengths);
-        let light = block.scene.sample_lights(at.position, u1, u2, w, at.active);
+        let light = block.scene.sample_lights(at, u1, u2, w);
         let wo = at.frame.to_local(light.direction);
         let value = block.material.eval_lanes(at, at.wi, wo, w);
         let weight = F::select(light.delta, F::one(), power(light.pdf, value.pdf));

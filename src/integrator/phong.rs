@@ -235,7 +235,7 @@ impl<S: Spectral> Bounce<'_, '_, S> {
         let u2 = block.decisions(light).u2::<F>();
         let (at, w) = (&block.at, block.wavelengths);
         let from = &block.scene.lights()[light as usize];
-        let sample = from.sample_lanes(at.position, u2, w, at.active);
+        let sample = from.sample_lanes(at, u2, w, at.active);
         let wo = at.frame.to_local(sample.direction);
         let terms = block.material.phong_lanes(at, at.wi, wo, w);
         // What a light sample brings has the inverse square in it.

@@ -8,6 +8,8 @@ use crate::mesh::Mesh;
 pub trait Source {
     /// A lane's point.
     fn interaction(&self, lane: usize) -> Interaction<'_>;
+    /// A lane's time.
+    fn time(&self, lane: usize) -> f32;
     /// Where on its mesh, if it is on one, a lane's point lies: the triangle, and its second and third coordinate.
     fn on_mesh(&self, lane: usize) -> Option<(&Mesh, u32, glam::Vec2)>;
 }
@@ -15,6 +17,10 @@ pub trait Source {
 impl Source for Interaction<'_> {
     fn interaction(&self, _lane: usize) -> Interaction<'_> {
         self.clone()
+    }
+
+    fn time(&self, _lane: usize) -> f32 {
+        self.time
     }
 
     fn on_mesh(&self, _lane: usize) -> Option<(&Mesh, u32, glam::Vec2)> {

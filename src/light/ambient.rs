@@ -2,13 +2,14 @@
 //! with an `ambient_reflectance` return. It is the I_a of Phong's equation and no light of physics: in `path`
 //! and `direct` a surface emits I_a·k_a of its own, and nobody looks for the light.
 
-use glam::{Vec2, Vec3};
+use glam::Vec2;
 
 use super::{Emitter, LightContext, LightSample};
 use crate::color::{ColorModel, Role};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, color};
 use crate::error::Result;
+use crate::interaction::Reference;
 
 /// Light from nowhere.
 #[derive(Clone, Debug)]
@@ -36,7 +37,7 @@ impl<C: ColorModel> Ambient<C> {
 impl<C: ColorModel> Emitter<C> for Ambient<C> {
     fn sample(
         &self,
-        _from: Vec3,
+        _from: Reference,
         _u: Vec2,
         _wavelengths: &C::Wavelengths,
     ) -> Option<LightSample<C::Sample>> {

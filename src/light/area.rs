@@ -1,5 +1,7 @@
 //! `area`: a shape that emits `radiance` from its front, the same in all directions. Points are drawn as the
-//! shape draws them, by solid angle where it can, and where a texture makes parts of it bright also by that.
+//! shape draws them, by solid angle where it can, and where a texture makes parts of it bright also by that. On a shape
+//! that moves they are drawn in the shape's own space, from where the other point is there at its time: an affine map A
+//! turns a density per solid angle p(ω) into p(ω)·|Aω|³/|det A|.
 
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -13,9 +15,10 @@ use crate::color::{ColorModel, Role, Spectral};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, texture};
 use crate::error::Result;
-use crate::interaction::Interaction;
+use crate::interaction::{Interaction, Reference};
 use crate::lanes::{self, Lanes};
-use crate::shape::Geometry;
+use crate::math::{Moving, Transform};
+use crate::shape::{Geometry, SurfaceSample};
 use crate::texture::{Palettes, Texture};
 
 /// A shape that gives light.
@@ -23,6 +26,8 @@ use crate::texture::{Palettes, Texture};
 pub struct Area<C: ColorModel> {
     radiance: Texture<C>,
     shape: Arc<Geometry>,
+    /// From the shape's space to the world, where it moves.
+    motion: Option<Moving>,
     /// Over the area, of the channels' mean.
     mean: f64,
     /// Where a texture is not even.
@@ -59,6 +64,7 @@ impl<C: ColorModel> Area<C> {
         Ok(Self {
             radiance,
             shape: shape.clone(),
+            motion: context.motion.cloned(),
             mean,
             brightness,
         })
@@ -66,9 +72,25 @@ impl<C: ColorModel> Area<C> {
 }
 
 impl<C: ColorModel> Area<C> {
-    /// Whether it is the same all over, so that it is written over lanes.
-    pub(super) fn is_even(&self) -> bool {
-        matches!(self.radiance, Texture::Uniform(_))
+    /// Whether it is: it is the same all over, and stands still.
+    pub(super) fn is_written_over_lanes(&self) -> bool {
+        matches!(self.radiance, Texture::Uniform(_)) && self.motion.is_none()
+    }
+
+    /// A point of the shape, in its own space.
+    fn draw(&self, from: Vec3, u: Vec2) -> Option<SurfaceSample> {
+        match &self.brightness {
+            Some(brightness) => brightness.sample(&self.shape, from, u),
+            None => self.shape.sample(from, u),
+        }
+    }
+
+    /// The density with which [`Self::draw`] draws a point, in its own space.
+    fn density(&self, from: Vec3, at: &Interaction<'_>) -> f32 {
+        match &self.brightness {
+            Some(brightness) => brightness.pdf(&self.shape, from, at),
+            None => self.shape.pdf(from, at),
+        }
     }
 }
 
@@ -100,27 +122,38 @@ impl<C: ColorModel> BlockEmitter<C> for Area<C> {
 impl<C: ColorModel> Emitter<C> for Area<C> {
     fn sample(
         &self,
-        from: Vec3,
+        from: Reference,
         u: Vec2,
         wavelengths: &C::Wavelengths,
     ) -> Option<LightSample<C::Sample>> {
-        let point = match &self.brightness {
-            Some(brightness) => brightness.sample(&self.shape, from, u)?,
-            None => self.shape.sample(from, u)?,
+        let to_world = self.motion.as_ref().map(|motion| motion.at(from.time));
+        let own = match &to_world {
+            Some(to_world) => to_world.inverse().point(from.position),
+            None => from.position,
         };
-        let direction = (point.position - from).normalize_or_zero();
-        if direction.dot(point.normal) >= 0.0 {
+        let point = self.draw(own, u)?;
+        let way = point.position - own;
+        // Which side emits is the same in the shape's own space as in the world.
+        if way.dot(point.normal) >= 0.0 {
             return None;
         }
+        let (target, pdf) = match &to_world {
+            Some(to_world) => {
+                let pdf = point.pdf * solid_angle_ratio(to_world, way);
+                (to_world.point(point.position), pdf)
+            }
+            None => (point.position, point.pdf),
+        };
+        let direction = (target - from.position).normalize_or_zero();
         let radiance = match &self.radiance {
             Texture::Uniform(radiance) => C::evaluate(radiance.value(), wavelengths),
             texture => texture.eval(&interaction(&self.shape, &point), wavelengths),
         };
         Some(LightSample {
             direction,
-            target: Some(point.position),
+            target: Some(target),
             radiance,
-            pdf: point.pdf,
+            pdf,
             delta: false,
         })
     }
@@ -134,13 +167,31 @@ impl<C: ColorModel> Emitter<C> for Area<C> {
     }
 
     fn surface_pdf(&self, from: Vec3, at: &Interaction<'_>) -> f32 {
-        match &self.brightness {
-            Some(brightness) => brightness.pdf(&self.shape, from, at),
-            None => self.shape.pdf(from, at),
-        }
+        let Some(motion) = &self.motion else {
+            return self.density(from, at);
+        };
+        let to_world = motion.at(at.time);
+        let to_own = to_world.inverse();
+        let own = at
+            .clone()
+            .transformed(&to_own, to_own.vector(-at.frame.to_world(at.wi)));
+        let from = to_own.point(from);
+        self.density(from, &own) * solid_angle_ratio(&to_world, own.position - from)
     }
 
     fn power(&self, _color: &C, _radius: f64) -> f64 {
-        PI * self.shape.area() * self.mean
+        // Of what moves the area as it is at the first keyframe, if it grows evenly.
+        let scale = self.motion.as_ref().map_or(1.0, |motion| {
+            let linear = motion.at(motion.times()[0]).linear();
+            f64::from(linear.determinant().abs()).powf(2.0 / 3.0)
+        });
+        PI * self.shape.area() * scale * self.mean
     }
+}
+
+/// What a density per solid angle in the direction `way`, which need not be of unit length, is multiplied by where space
+/// is mapped: |Aω|³/|det A|.
+fn solid_angle_ratio(to_world: &Transform, way: Vec3) -> f32 {
+    let stretch = to_world.vector(way.normalize_or_zero()).length();
+    stretch * stretch * stretch / to_world.linear().determinant().abs()
 }

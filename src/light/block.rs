@@ -2,6 +2,7 @@
 
 use super::Light;
 use crate::color::{ColorModel, Spectra, Spectral};
+use crate::interaction::{Points, Reference, Source};
 use crate::lanes::{Call, Lanes, Mask as _, Vec2, Vec3};
 
 /// Directions drawn toward a light; the fields are those of [`super::LightSample`].
@@ -49,7 +50,7 @@ impl<F: Lanes, S: Spectra<F>> LightSamples<F, S> {
     }
 }
 
-/// A light that is written over lanes. Wavelengths are given from the first lane on.
+/// A light that stands still and is written over lanes. Wavelengths are given from the first lane on.
 pub(super) trait BlockEmitter<C: ColorModel> {
     /// [`super::Emitter::sample`] for the lanes that are `active`; what the others get is not used.
     fn sample_lanes<F: Lanes>(
@@ -61,10 +62,12 @@ pub(super) trait BlockEmitter<C: ColorModel> {
     ) -> LightSamples<F, C::Columns<F>>;
 }
 
-/// The arguments of [`BlockEmitter::sample_lanes`] of a light.
+/// The arguments of [`Light::sample_lanes`].
 struct Draw<'a, C: ColorModel, F: Lanes> {
     light: &'a Light<C>,
     from: Vec3<F>,
+    /// Who knows the lanes' times.
+    source: &'a dyn Source,
     u: Vec2<F>,
     w: &'a [C::Wavelengths],
     active: F::Mask,
@@ -81,29 +84,33 @@ impl<C: ColorModel, F: Lanes> Call<F> for Draw<'_, C, F> {
             u,
             w,
             active,
+            ..
         } = self;
         match light {
-            Light::Area(area) if area.is_even() => area.sample_lanes(from, u, w, active),
+            Light::Area(area) if area.is_written_over_lanes() => {
+                area.sample_lanes(from, u, w, active)
+            }
             Light::Constant(constant) => constant.sample_lanes(from, u, w, active),
-            Light::Envmap(envmap) => envmap.sample_lanes(from, u, w, active),
-            other => sample_each(other, from, u, w, active),
+            Light::Envmap(envmap) if envmap.is_still() => envmap.sample_lanes(from, u, w, active),
+            _ => self.each(),
         }
     }
 }
 
 impl<C: ColorModel> Light<C> {
-    /// Directions from the points `from` toward the light, for the lanes that are `active`.
+    /// Directions from those of the points `from` that are `active` toward the light, each at its own time.
     #[inline(always)]
     pub fn sample_lanes<F: Lanes>(
         &self,
-        from: Vec3<F>,
+        from: &Points<'_, F>,
         u: Vec2<F>,
         w: &[C::Wavelengths],
         active: F::Mask,
     ) -> LightSamples<F, C::Columns<F>> {
         F::call(Draw {
             light: self,
-            from,
+            from: from.position,
+            source: from.source,
             u,
             w,
             active,
@@ -111,43 +118,51 @@ impl<C: ColorModel> Light<C> {
     }
 }
 
-/// Directions toward a light that is asked lane by lane.
-#[inline(always)]
-fn sample_each<C: ColorModel, F: Lanes>(
-    light: &Light<C>,
-    from: Vec3<F>,
-    u: Vec2<F>,
-    w: &[C::Wavelengths],
-    active: F::Mask,
-) -> LightSamples<F, C::Columns<F>> {
-    let there = active.to_bits();
-    let (mut direction, mut target, mut pdf) = ([F::ROW; 3], [F::ROW; 3], F::ROW);
-    let (mut distant, mut delta) = (0, 0);
-    let radiance = Spectra::from_samples(|lane| {
-        let sample = if there >> lane & 1 == 1 {
-            light.sample(from.lane(lane), u.lane(lane), &w[lane])
-        } else {
-            None
-        };
-        let Some(sample) = sample else {
-            return C::Sample::zero();
-        };
-        for axis in 0..3 {
-            direction[axis][lane] = sample.direction[axis];
-            target[axis][lane] = sample.target.unwrap_or_default()[axis];
+impl<C: ColorModel, F: Lanes> Draw<'_, C, F> {
+    /// Directions toward a light that is asked lane by lane.
+    #[inline(always)]
+    fn each(self) -> LightSamples<F, C::Columns<F>> {
+        let Self {
+            light,
+            from,
+            source,
+            u,
+            w,
+            active,
+        } = self;
+        let there = active.to_bits();
+        let (mut direction, mut target, mut pdf) = ([F::ROW; 3], [F::ROW; 3], F::ROW);
+        let (mut distant, mut delta) = (0, 0);
+        let radiance = Spectra::from_samples(|lane| {
+            let sample = if there >> lane & 1 == 1 {
+                let from = Reference {
+                    position: from.lane(lane),
+                    time: source.time(lane),
+                };
+                light.sample(from, u.lane(lane), &w[lane])
+            } else {
+                None
+            };
+            let Some(sample) = sample else {
+                return C::Sample::zero();
+            };
+            for axis in 0..3 {
+                direction[axis][lane] = sample.direction[axis];
+                target[axis][lane] = sample.target.unwrap_or_default()[axis];
+            }
+            distant |= u32::from(sample.target.is_none()) << lane;
+            delta |= u32::from(sample.delta) << lane;
+            pdf[lane] = sample.pdf;
+            sample.radiance
+        });
+        LightSamples {
+            direction: Vec3::<F>::load(&direction),
+            target: Vec3::<F>::load(&target),
+            distant: F::Mask::from_bits(distant),
+            radiance,
+            pdf: F::load(&pdf),
+            delta: F::Mask::from_bits(delta),
         }
-        distant |= u32::from(sample.target.is_none()) << lane;
-        delta |= u32::from(sample.delta) << lane;
-        pdf[lane] = sample.pdf;
-        sample.radiance
-    });
-    LightSamples {
-        direction: Vec3::<F>::load(&direction),
-        target: Vec3::<F>::load(&target),
-        distant: F::Mask::from_bits(distant),
-        radiance,
-        pdf: F::load(&pdf),
-        delta: F::Mask::from_bits(delta),
     }
 }
 
@@ -159,7 +174,13 @@ pub(super) fn single_sample<C: ColorModel, E: BlockEmitter<C>>(
     w: &C::Wavelengths,
 ) -> Option<super::LightSample<C::Sample>> {
     let w = std::slice::from_ref(w);
-    let samples = emitter.sample_lanes::<f32>(from.into(), u.into(), w, true);
+    single(emitter.sample_lanes::<f32>(from.into(), u.into(), w, true))
+}
+
+/// A single direction; `None` where nothing arrives.
+pub(super) fn single<S: Spectral, T: Spectra<f32>>(
+    samples: LightSamples<f32, T>,
+) -> Option<super::LightSample<S>> {
     (samples.pdf > 0.0).then(|| super::LightSample {
         direction: samples.direction.into(),
         target: (!samples.distant).then(|| samples.target.into()),

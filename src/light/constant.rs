@@ -8,6 +8,7 @@ use crate::color::{ColorModel, Role};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, color};
 use crate::error::Result;
+use crate::interaction::Reference;
 use crate::lanes::{Lanes, Mask as _, Vec2, Vec3, warp};
 
 /// A uniform environment.
@@ -64,11 +65,11 @@ impl<C: ColorModel> BlockEmitter<C> for Constant<C> {
 impl<C: ColorModel> Emitter<C> for Constant<C> {
     fn sample(
         &self,
-        from: glam::Vec3,
+        from: Reference,
         u: glam::Vec2,
         wavelengths: &C::Wavelengths,
     ) -> Option<LightSample<C::Sample>> {
-        block::single_sample(self, from, u, wavelengths)
+        block::single_sample(self, from.position, u, wavelengths)
     }
 
     fn is_environment(&self) -> bool {
@@ -78,12 +79,13 @@ impl<C: ColorModel> Emitter<C> for Constant<C> {
     fn environment_radiance(
         &self,
         _direction: glam::Vec3,
+        _time: f32,
         wavelengths: &C::Wavelengths,
     ) -> C::Sample {
         C::evaluate(&self.radiance, wavelengths)
     }
 
-    fn environment_pdf(&self, _direction: glam::Vec3) -> f32 {
+    fn environment_pdf(&self, _direction: glam::Vec3, _time: f32) -> f32 {
         PDF
     }
 

@@ -10,6 +10,27 @@ use crate::color::{ColorModel, Role};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, color, vector};
 use crate::error::Result;
+use crate::interaction::Reference;
+use crate::math::Moving;
+
+/// Where light goes, unit length.
+#[derive(Clone, Debug)]
+enum Direction {
+    /// At all times there.
+    Still(Vec3),
+    /// Along the z axis.
+    Moving(Moving),
+}
+
+impl Direction {
+    #[inline]
+    fn at(&self, time: f32) -> Vec3 {
+        match self {
+            Self::Still(direction) => *direction,
+            Self::Moving(moving) => moving.at(time).vector(Vec3::Z).normalize(),
+        }
+    }
+}
 
 /// How far a scale may be from 1 without a word.
 const UNIT_LENGTH: f64 = 1e-3;
@@ -18,8 +39,7 @@ const UNIT_LENGTH: f64 = 1e-3;
 #[derive(Clone, Debug)]
 pub struct Directional<C: ColorModel> {
     irradiance: C::Stored,
-    /// Where the light goes, unit length.
-    direction: Vec3,
+    direction: Direction,
 }
 
 impl<C: ColorModel> Directional<C> {
@@ -46,11 +66,18 @@ impl<C: ColorModel> Directional<C> {
                     properties.error("direction", "direction and to_world exclude each other")
                 );
             }
-            Some(direction) => direction.normalize_or_zero(),
+            Some(direction) => {
+                let direction = direction.normalize_or_zero();
+                if direction == DVec3::ZERO {
+                    return Err(properties.error("direction", "a direction cannot have length 0"));
+                }
+                Direction::Still(direction.as_vec3())
+            }
             None => {
-                let axis = to_world(properties)?.vector(Vec3::Z).as_dvec3();
-                let length = axis.length();
-                if (length - 1.0).abs() > UNIT_LENGTH {
+                let moving = to_world(properties)?;
+                let axis = |time| moving.at(time).vector(Vec3::Z).as_dvec3();
+                let lengths = moving.times().into_iter().map(|time| axis(time).length());
+                if let Some(length) = lengths.into_iter().find(|l| (l - 1.0).abs() > UNIT_LENGTH) {
                     let message = format!(
                         "to_world scales the direction by {length:.4}, and the irradiance stays: Mitsuba multiplies it, and renders another image"
                     );
@@ -58,19 +85,19 @@ impl<C: ColorModel> Directional<C> {
                     let help = "leave out the scale, and give the irradiance that is meant";
                     context.palettes.colors.warn(warning.help(help));
                 }
-                axis.normalize_or_zero()
+                match moving.is_still() {
+                    true => Direction::Still(axis(0.0).normalize_or_zero().as_vec3()),
+                    false => Direction::Moving(moving),
+                }
             }
         };
-        if direction == DVec3::ZERO {
-            return Err(properties.error("direction", "a direction cannot have length 0"));
-        }
         let irradiance = context
             .palettes
             .colors
             .color(properties, "irradiance", Role::Emission)?;
         Ok(Self {
             irradiance,
-            direction: direction.as_vec3(),
+            direction,
         })
     }
 }
@@ -78,13 +105,13 @@ impl<C: ColorModel> Directional<C> {
 impl<C: ColorModel> Emitter<C> for Directional<C> {
     fn sample(
         &self,
-        _from: Vec3,
+        from: Reference,
         _u: Vec2,
         wavelengths: &C::Wavelengths,
     ) -> Option<LightSample<C::Sample>> {
         let radiance = C::evaluate(&self.irradiance, wavelengths);
         Some(LightSample {
-            direction: -self.direction,
+            direction: -self.direction.at(from.time),
             target: None,
             radiance,
             pdf: 1.0,

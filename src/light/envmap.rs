@@ -11,11 +11,12 @@ use glam::{Mat3, Vec2, Vec3};
 
 use super::block::{self, BlockEmitter};
 use super::grid::Grid;
-use super::{Emitter, LightContext, LightSample, LightSamples, rotation};
+use super::{Emitter, LightContext, LightSample, LightSamples, Rotation};
 use crate::color::{ColorModel, Pixels, Role, Spectra as _, luminance};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, boolean, file, float};
 use crate::error::Result;
+use crate::interaction::Reference;
 use crate::lanes::{self, Ints as _, Lanes, Mask as _};
 use crate::texture::Picture;
 
@@ -26,7 +27,7 @@ pub struct Envmap<C: ColorModel> {
     height: usize,
     texels: C::Texels,
     scale: f32,
-    to_world: Mat3,
+    to_world: Rotation,
     /// Over points in [0, 1]²: 0 is the first texel's centre across, the first row's down. `None` where all is black.
     cells: Option<Grid>,
     /// The mean luminance over all directions.
@@ -61,7 +62,7 @@ impl<C: ColorModel> Envmap<C> {
     ) -> Result<Self> {
         let path = properties.file("filename")?;
         let scale = properties.float("scale")?;
-        let to_world = rotation(properties)?;
+        let to_world = Rotation::of(properties)?;
         let picture = Picture::read(&path, false).map_err(|e| e.at(properties.location()))?;
         let picture = completed(picture);
         let [width, height] = picture.size;
@@ -79,15 +80,20 @@ impl<C: ColorModel> Envmap<C> {
         })
     }
 
-    /// Where directions lie.
+    /// Whether it is the same at all times, so that it is written over lanes.
+    pub(super) fn is_still(&self) -> bool {
+        self.to_world.is_still()
+    }
+
+    /// Where directions lie, the image being turned by `to_world`.
     #[inline(always)]
-    fn point<F: Lanes>(&self, direction: lanes::Vec3<F>) -> lanes::Vec2<F> {
+    fn point<F: Lanes>(&self, to_world: &Mat3, direction: lanes::Vec3<F>) -> lanes::Vec2<F> {
         let across = |axis: Vec3| direction.dot(lanes::Vec3::all(axis));
         let Mat3 {
             x_axis,
             y_axis,
             z_axis,
-        } = self.to_world;
+        } = *to_world;
         let (x, y, z) = (across(x_axis), across(y_axis), across(z_axis));
         let half = F::splat(0.5 / self.width as f32);
         let u = lanes::atan2(x, -z) * F::splat(1.0 / TAU) - half;
@@ -98,7 +104,7 @@ impl<C: ColorModel> Envmap<C> {
 
     /// The directions that lie there, and the sines of their polar angles.
     #[inline(always)]
-    fn direction<F: Lanes>(&self, p: lanes::Vec2<F>) -> (lanes::Vec3<F>, F) {
+    fn direction<F: Lanes>(&self, to_world: &Mat3, p: lanes::Vec2<F>) -> (lanes::Vec3<F>, F) {
         let half = F::splat(0.5 / self.width as f32);
         let (sin_phi, cos_phi) = lanes::sin_cos_turns(p.x + half);
         let (sin, cos) = lanes::sin_cos(p.y * F::splat(PI));
@@ -107,7 +113,7 @@ impl<C: ColorModel> Envmap<C> {
             x_axis,
             y_axis,
             z_axis,
-        } = self.to_world;
+        } = *to_world;
         let world =
             all(x_axis) * (sin * sin_phi) + all(y_axis) * cos - all(z_axis) * (sin * cos_phi);
         (world.normalize(), sin)
@@ -175,11 +181,12 @@ fn weights(Picture { size, pixels }: &Picture) -> Vec<f64> {
     weights
 }
 
-impl<C: ColorModel> BlockEmitter<C> for Envmap<C> {
+impl<C: ColorModel> Envmap<C> {
+    /// Directions, the image being turned by `to_world`.
     #[inline(always)]
-    fn sample_lanes<F: Lanes>(
+    fn sample_turned<F: Lanes>(
         &self,
-        _from: lanes::Vec3<F>,
+        to_world: &Mat3,
         u: lanes::Vec2<F>,
         w: &[C::Wavelengths],
         _active: F::Mask,
@@ -188,7 +195,7 @@ impl<C: ColorModel> BlockEmitter<C> for Envmap<C> {
             return LightSamples::none();
         };
         let (place, density) = cells.sample(u);
-        let (direction, sine) = self.direction(place);
+        let (direction, sine) = self.direction(to_world, place);
         LightSamples {
             direction,
             distant: F::Mask::splat(true),
@@ -199,31 +206,54 @@ impl<C: ColorModel> BlockEmitter<C> for Envmap<C> {
     }
 }
 
+impl<C: ColorModel> BlockEmitter<C> for Envmap<C> {
+    #[inline(always)]
+    fn sample_lanes<F: Lanes>(
+        &self,
+        _from: lanes::Vec3<F>,
+        u: lanes::Vec2<F>,
+        w: &[C::Wavelengths],
+        active: F::Mask,
+    ) -> LightSamples<F, C::Columns<F>> {
+        // Of one that stands still; another is asked lane by lane.
+        self.sample_turned(&self.to_world.at(0.0), u, w, active)
+    }
+}
+
 impl<C: ColorModel> Emitter<C> for Envmap<C> {
     fn sample(
         &self,
-        from: Vec3,
+        from: Reference,
         u: Vec2,
         wavelengths: &C::Wavelengths,
     ) -> Option<LightSample<C::Sample>> {
-        block::single_sample(self, from, u, wavelengths)
+        let to_world = self.to_world.at(from.time);
+        let w = std::slice::from_ref(wavelengths);
+        block::single(self.sample_turned::<f32>(&to_world, u.into(), w, true))
     }
 
     fn is_environment(&self) -> bool {
         true
     }
 
-    fn environment_radiance(&self, direction: Vec3, wavelengths: &C::Wavelengths) -> C::Sample {
-        let place = self.point::<f32>(direction.into());
+    fn environment_radiance(
+        &self,
+        direction: Vec3,
+        time: f32,
+        wavelengths: &C::Wavelengths,
+    ) -> C::Sample {
+        let to_world = self.to_world.at(time);
+        let place = self.point::<f32>(&to_world, direction.into());
         let w = std::slice::from_ref(wavelengths);
         self.radiance(place, w).sample(0)
     }
 
-    fn environment_pdf(&self, direction: Vec3) -> f32 {
+    fn environment_pdf(&self, direction: Vec3, time: f32) -> f32 {
         let Some(cells) = &self.cells else {
             return 0.0;
         };
-        let p = self.point::<f32>(direction.into());
+        let to_world = self.to_world.at(time);
+        let p = self.point::<f32>(&to_world, direction.into());
         Self::per_solid_angle(cells.pdf(p), lanes::sin_cos(PI * p.y).0)
     }
 

@@ -18,11 +18,11 @@ use glam::{Mat3, Vec2, Vec3};
 
 use crate::color::{ColorModel, Rgb, Spectral};
 use crate::description::Properties;
-use crate::description::declared::{Row, float, transform};
+use crate::description::declared::{Row, float, motion};
 use crate::error::Result;
 use crate::family::{self, family};
-use crate::interaction::Interaction;
-use crate::math::{Frame, Transform};
+use crate::interaction::{Interaction, Reference};
+use crate::math::{Frame, Moving};
 use crate::shape::{Geometry, SurfaceSample};
 use crate::texture::{Palettes, Texture};
 
@@ -45,10 +45,10 @@ pub struct LightSample<S> {
 
 /// What every light does.
 pub trait Emitter<C: ColorModel>: std::fmt::Debug + Send + Sync {
-    /// A direction from the point `from` toward the light; `None` where none of its light arrives.
+    /// A direction from `from` toward the light as it stands at that time; `None` where none of its light arrives.
     fn sample(
         &self,
-        from: Vec3,
+        from: Reference,
         u: Vec2,
         wavelengths: &C::Wavelengths,
     ) -> Option<LightSample<C::Sample>>;
@@ -57,7 +57,7 @@ pub trait Emitter<C: ColorModel>: std::fmt::Debug + Send + Sync {
     fn surface_radiance(&self, _at: &Interaction<'_>, _wavelengths: &C::Wavelengths) -> C::Sample {
         C::Sample::zero()
     }
-    /// The density with which [`Emitter::sample`] draws the surface point `at` from `from`.
+    /// The density with which [`Emitter::sample`] draws the surface point `at` from `from`, at the time of `at`.
     fn surface_pdf(&self, _from: Vec3, _at: &Interaction<'_>) -> f32 {
         0.0
     }
@@ -81,12 +81,17 @@ pub trait Emitter<C: ColorModel>: std::fmt::Debug + Send + Sync {
     fn is_environment(&self) -> bool {
         false
     }
-    /// Radiance of the environment from a world direction.
-    fn environment_radiance(&self, _direction: Vec3, _wavelengths: &C::Wavelengths) -> C::Sample {
+    /// Radiance of the environment from a world direction at `time`.
+    fn environment_radiance(
+        &self,
+        _direction: Vec3,
+        _time: f32,
+        _wavelengths: &C::Wavelengths,
+    ) -> C::Sample {
         C::Sample::zero()
     }
-    /// The density with which [`Emitter::sample`] draws an environment's direction.
-    fn environment_pdf(&self, _direction: Vec3) -> f32 {
+    /// The density with which [`Emitter::sample`] draws an environment's direction at `time`.
+    fn environment_pdf(&self, _direction: Vec3, _time: f32) -> f32 {
         0.0
     }
 }
@@ -98,6 +103,8 @@ pub struct LightContext<'a, C: ColorModel> {
     pub palettes: &'a Palettes<C>,
     /// The shape that an area light stands on.
     pub shape: Option<&'a Arc<Geometry>>,
+    /// From the shape's space to the world, where it moves.
+    pub motion: Option<&'a Moving>,
 }
 
 family! {
@@ -123,7 +130,7 @@ const SAMPLING: &[Row] = &[float(
 )
 .at_least(0.0)];
 /// Where a light stands.
-const TO_WORLD: Row = transform("to_world", "from the light's space to the world");
+const TO_WORLD: Row = motion("to_world", "from the light's space to the world");
 
 /// How often a light is chosen for light sampling, beside others that are alike; at least 0.
 pub fn sampling_weight(properties: &Properties<'_>) -> Result<f64> {
@@ -132,31 +139,91 @@ pub fn sampling_weight(properties: &Properties<'_>) -> Result<f64> {
 }
 
 /// The property `to_world`.
-fn to_world(properties: &Properties<'_>) -> Result<Transform> {
-    let matrix = properties.transform("to_world")?;
-    Transform::new(&matrix)
-        .ok_or_else(|| properties.error("to_world", "the transform must be affine and invertible"))
+fn to_world(properties: &Properties<'_>) -> Result<Moving> {
+    properties.motion("to_world")
 }
 
 /// Where the property `to_world` puts the origin, whatever else it does.
-fn origin(properties: &Properties<'_>) -> Result<Vec3> {
-    let matrix = properties.transform("to_world")?;
-    Ok(matrix.w_axis.truncate().as_vec3())
+#[derive(Clone, Debug)]
+enum Origin {
+    /// At all times there.
+    Still(Vec3),
+    /// The origin's image.
+    Moving(Moving),
+}
+
+impl Origin {
+    fn of(properties: &Properties<'_>) -> Result<Self> {
+        if properties.animation("to_world")?.is_some() {
+            return Ok(Self::Moving(to_world(properties)?));
+        }
+        let matrix = properties.transform("to_world")?;
+        Ok(Self::Still(matrix.w_axis.truncate().as_vec3()))
+    }
+
+    #[inline]
+    fn at(&self, time: f32) -> Vec3 {
+        match self {
+            Self::Still(position) => *position,
+            Self::Moving(moving) => moving.at(time).translation(),
+        }
+    }
 }
 
 /// The property `to_world` of a light that is infinitely far: a rotation, maybe mirrored.
-fn rotation(properties: &Properties<'_>) -> Result<Mat3> {
-    let m = to_world(properties)?.linear();
-    let scale = m.x_axis.length();
-    let rotation = m * scale.recip();
-    let product = rotation.transpose() * rotation;
-    if product.abs_diff_eq(Mat3::IDENTITY, 1e-4) {
-        Ok(rotation)
-    } else {
-        Err(properties
-            .error("to_world", "an environment cannot be stretched or sheared")
-            .help("leave a rotation"))
+#[derive(Clone, Debug)]
+enum Rotation {
+    /// The same at all times.
+    Still(Mat3),
+    /// A rotation with a scale that does not count.
+    Moving(Moving),
+}
+
+impl Rotation {
+    fn of(properties: &Properties<'_>) -> Result<Self> {
+        let moving = to_world(properties)?;
+        let mut rotations = moving
+            .times()
+            .into_iter()
+            .map(|time| rotation(moving.at(time).linear()));
+        let Some(still) = rotations
+            .next()
+            .flatten()
+            .filter(|_| rotations.all(|r| r.is_some()))
+        else {
+            return Err(properties
+                .error("to_world", "an environment cannot be stretched or sheared")
+                .help("leave a rotation"));
+        };
+        Ok(match moving.is_still() {
+            true => Self::Still(still),
+            false => Self::Moving(moving),
+        })
     }
+
+    #[inline]
+    fn at(&self, time: f32) -> Mat3 {
+        match self {
+            Self::Still(rotation) => *rotation,
+            Self::Moving(moving) => {
+                let linear = moving.at(time).linear();
+                linear * linear.x_axis.length().recip()
+            }
+        }
+    }
+
+    fn is_still(&self) -> bool {
+        matches!(self, Self::Still(_))
+    }
+}
+
+/// The rotation in a linear map that neither stretches nor shears.
+fn rotation(linear: Mat3) -> Option<Mat3> {
+    let rotation = linear * linear.x_axis.length().recip();
+    let product = rotation.transpose() * rotation;
+    product
+        .abs_diff_eq(Mat3::IDENTITY, 1e-4)
+        .then_some(rotation)
 }
 
 /// The mean of a path's channels in use.

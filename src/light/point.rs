@@ -2,19 +2,20 @@
 
 use std::f64::consts::PI;
 
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DVec3, Vec2};
 
-use super::{Emitter, LightContext, LightSample, mean_of, origin};
+use super::{Emitter, LightContext, LightSample, Origin, mean_of};
 use crate::color::{ColorModel, Role};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, color, vector};
 use crate::error::Result;
+use crate::interaction::Reference;
 
 /// A point that gives light.
 #[derive(Clone, Debug)]
 pub struct Point<C: ColorModel> {
     intensity: C::Stored,
-    position: Vec3,
+    position: Origin,
 }
 
 impl<C: ColorModel> Point<C> {
@@ -40,8 +41,8 @@ impl<C: ColorModel> Point<C> {
                     properties.error("position", "position and to_world exclude each other")
                 );
             }
-            Some(position) => position.as_vec3(),
-            None => origin(properties)?,
+            Some(position) => Origin::Still(position.as_vec3()),
+            None => Origin::of(properties)?,
         };
         let intensity = context
             .palettes
@@ -57,15 +58,16 @@ impl<C: ColorModel> Point<C> {
 impl<C: ColorModel> Emitter<C> for Point<C> {
     fn sample(
         &self,
-        from: Vec3,
+        from: Reference,
         _u: Vec2,
         wavelengths: &C::Wavelengths,
     ) -> Option<LightSample<C::Sample>> {
-        let way = self.position - from;
+        let position = self.position.at(from.time);
+        let way = position - from.position;
         let squared = way.length_squared();
         (squared > 0.0).then(|| LightSample {
             direction: way / squared.sqrt(),
-            target: Some(self.position),
+            target: Some(position),
             radiance: C::evaluate(&self.intensity, wavelengths) / squared,
             pdf: 1.0,
             delta: true,

@@ -11,7 +11,8 @@ use crate::color::{ColorModel, Role};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, float, texture};
 use crate::error::Result;
-use crate::math::Transform;
+use crate::interaction::Reference;
+use crate::math::Moving;
 use crate::sensor::tangent_x;
 use crate::texture::Texture;
 
@@ -20,7 +21,7 @@ use crate::texture::Texture;
 pub struct Projector<C: ColorModel> {
     image: Texture<C>,
     scale: f32,
-    to_world: Transform,
+    to_world: Moving,
     /// Half the image's extent at distance 1.
     half: Vec2,
 }
@@ -60,20 +61,21 @@ impl<C: ColorModel> Projector<C> {
 impl<C: ColorModel> Emitter<C> for Projector<C> {
     fn sample(
         &self,
-        from: Vec3,
+        from: Reference,
         _u: Vec2,
         wavelengths: &C::Wavelengths,
     ) -> Option<LightSample<C::Sample>> {
-        let local = self.to_world.inverse().point(from);
+        let to_world = self.to_world.at(from.time);
+        let local = to_world.inverse().point(from.position);
         // As a camera sees it, +x is to the image's left and +y up.
         let uv = 0.5 - 0.5 * local.truncate() / (local.z * self.half);
         if local.z <= 0.0 || !(uv.cmpge(Vec2::ZERO) & uv.cmple(Vec2::ONE)).all() {
             return None;
         }
-        let position = self.to_world.translation();
-        let way = position - from;
+        let position = to_world.translation();
+        let way = position - from.position;
         let direction = way.normalize();
-        let cosine = -self.to_world.vector(Vec3::Z).dot(direction);
+        let cosine = -to_world.vector(Vec3::Z).dot(direction);
         let image = self
             .image
             .eval(&texture_point(position, Vec3::Z, uv), wavelengths);

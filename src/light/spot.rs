@@ -13,7 +13,8 @@ use crate::color::{ColorModel, Role};
 use crate::description::declared::{Plugin, color, float, map};
 use crate::description::{Kind, Properties};
 use crate::error::Result;
-use crate::math::Transform;
+use crate::interaction::Reference;
+use crate::math::Moving;
 use crate::texture::Texture;
 
 /// A point that gives light into a cone.
@@ -21,7 +22,7 @@ use crate::texture::Texture;
 pub struct Spot<C: ColorModel> {
     intensity: C::Stored,
     slide: Option<Texture<C>>,
-    to_world: Transform,
+    to_world: Moving,
     /// In radians.
     cutoff: f32,
     /// In radians.
@@ -102,14 +103,15 @@ impl<C: ColorModel> Spot<C> {
 impl<C: ColorModel> Emitter<C> for Spot<C> {
     fn sample(
         &self,
-        from: Vec3,
+        from: Reference,
         _u: Vec2,
         wavelengths: &C::Wavelengths,
     ) -> Option<LightSample<C::Sample>> {
-        let position = self.to_world.translation();
-        let way = position - from;
+        let to_world = self.to_world.at(from.time);
+        let position = to_world.translation();
+        let way = position - from.position;
         let squared = way.length_squared();
-        let local = self.to_world.inverse().vector(-way);
+        let local = to_world.inverse().vector(-way);
         // Not the arc cosine, which has no precision near the axis.
         let falloff = self.falloff(local.truncate().length().atan2(local.z));
         if squared <= 0.0 || falloff <= 0.0 {

@@ -51,6 +51,7 @@ impl Pictures {
         let context = LightContext {
             palettes: &palettes,
             shape: None,
+            motion: None,
         };
         let light = Light::build(&scene.root().children(Kind::Emitter)[0], &context)?;
         Ok(light)
@@ -60,6 +61,13 @@ impl Pictures {
 fn point(seed: u64, i: u32) -> Vec2 {
     let unit = |n| random::unit(random::bits(seed, n));
     Vec2::new(unit(2 * i), unit(2 * i + 1))
+}
+
+fn there(position: Vec3) -> Reference {
+    Reference {
+        position,
+        time: 0.0,
+    }
 }
 
 fn near(a: Samples<3>, b: [f32; 3]) -> bool {
@@ -90,7 +98,7 @@ fn an_envmap_looks_as_mitsuba_s_does() {
         ([0.3, 0.9, 0.3], 6.928_572_7),
     ] {
         let direction = Vec3::from_array(direction).normalize();
-        let radiance = light.environment_radiance(direction, &());
+        let radiance = light.environment_radiance(direction, 0.0, &());
         assert!(
             near(radiance, [red, 2.0 * red, 0.5 * red]),
             "{direction} {radiance:?}"
@@ -128,17 +136,17 @@ fn every_environment_is_drawn_with_the_density_that_it_says_and_missed_nowhere()
         let n = 40_000;
         let (mut drawn, mut uniform, mut strays) = (0.0, 0.0, 0);
         for i in 0..n {
-            let sample = light.sample(Vec3::ONE, point(1, i), &()).unwrap();
+            let sample = light.sample(there(Vec3::ONE), point(1, i), &()).unwrap();
             assert!((sample.direction.length() - 1.0).abs() < 1e-5);
-            let back = light.environment_radiance(sample.direction, &());
+            let back = light.environment_radiance(sample.direction, 0.0, &());
             assert!((back.0[0] - sample.radiance.0[0]).abs() < 1e-2 * (1.0 + back.0[0]));
-            let pdf = light.environment_pdf(sample.direction);
+            let pdf = light.environment_pdf(sample.direction, 0.0);
             // Rounding may carry a direction at the border of a cell into the next.
             strays += u32::from((pdf / sample.pdf - 1.0).abs() > 1e-3);
             drawn += f64::from(sample.radiance.0[0] / sample.pdf);
             let direction = Vec3::from(warp::uniform_sphere(point(2, i).into()));
-            let radiance = light.environment_radiance(direction, &());
-            assert!(radiance.is_black() || light.environment_pdf(direction) > 0.0);
+            let radiance = light.environment_radiance(direction, 0.0, &());
+            assert!(radiance.is_black() || light.environment_pdf(direction, 0.0) > 0.0);
             uniform += f64::from(radiance.0[0]) * 4.0 * std::f64::consts::PI;
         }
         assert!(strays < n / 1000, "{strays}");
@@ -172,7 +180,7 @@ fn an_envmap_of_any_size_is_taken() {
     ] {
         let light = light(width, height);
         let direction = Vec3::from_array(direction).normalize();
-        let radiance = light.environment_radiance(direction, &());
+        let radiance = light.environment_radiance(direction, 0.0, &());
         for c in 0..3 {
             let error = (radiance.0[c] - expected[c]).abs();
             assert!(
@@ -191,8 +199,12 @@ fn a_black_envmap_is_never_drawn() {
         format!(r#"<emitter type="envmap"><string name="filename" value="{name}"/></emitter>"#)
     };
     let black = pictures.light(&text("black.exr"));
-    assert!(black.sample(Vec3::ZERO, Vec2::splat(0.5), &()).is_none());
-    assert!(black.environment_radiance(Vec3::X, &()).is_black());
+    assert!(
+        black
+            .sample(there(Vec3::ZERO), Vec2::splat(0.5), &())
+            .is_none()
+    );
+    assert!(black.environment_radiance(Vec3::X, 0.0, &()).is_black());
 }
 
 const AIM: &str = r#"<transform name="to_world"><lookat origin="1, 2, 3" target="0, 0.5, -1" up="0, 1, 0"/></transform>"#;
@@ -247,7 +259,7 @@ fn spots_and_projectors_throw_what_mitsuba_s_do() {
     ] {
         let light = pictures.light(&text);
         for (p, red) in points.into_iter().zip(expected) {
-            let sample = light.sample(Vec3::from_array(p), Vec2::ZERO, &());
+            let sample = light.sample(there(Vec3::from_array(p)), Vec2::ZERO, &());
             let ours = sample.map_or(0.0, |s| s.radiance.0[0]);
             assert!(
                 (ours - red).abs() <= 1e-4 * red,
@@ -257,12 +269,31 @@ fn spots_and_projectors_throw_what_mitsuba_s_do() {
     }
 }
 
-/// Every light of the family.
-fn every_light(pictures: &Pictures) -> Vec<(&'static str, Light<Rgb>, Arc<Geometry>)> {
+/// Turns, grows and moves.
+const MOTION: &str = "<animation name='to_world'><transform time='0'><rotate y='1' angle='10'/></transform>
+    <transform time='2'><scale value='1.5'/><rotate x='1' z='2' angle='100'/><translate x='0.3' y='1'/></transform></animation>";
+/// Stretches unevenly besides, which what is far away cannot.
+const STRETCH: &str = "<animation name='to_world'><transform time='0'><rotate y='1' angle='10'/></transform>
+    <transform time='2'><scale x='2' y='0.5'/><rotate x='1' z='2' angle='50'/><translate x='0.3' y='1'/></transform></animation>";
+
+/// Every light of the family, with its motion and its shape.
+fn every_light(
+    pictures: &Pictures,
+    motion: &str,
+) -> Vec<(&'static str, Light<Rgb>, Moving, Arc<Geometry>)> {
     pictures.add("any.exr", 4, |x, y| [(1 + x + y) as f32; 3]);
-    let text = "<scene version='3.0.0'><shape type='sphere'><point name='center' value='0, 0, 3'/></shape></scene>";
-    let scene = Description::parse(text, "test.xml".as_ref(), &Options::default()).unwrap();
-    let shape = crate::shape::build(&scene.root().children(Kind::Shape)[0]).unwrap();
+    let text = format!(
+        "<scene version='3.0.0'><shape type='sphere'><point name='center' value='0, 0, 3'/></shape>
+        <shape type='group'>{}</shape></scene>",
+        motion.replace(MOTION, STRETCH)
+    );
+    let scene = Description::parse(&text, "test.xml".as_ref(), &Options::default()).unwrap();
+    let [shape, node] = &scene.root().children(Kind::Shape)[..] else {
+        panic!("two shapes")
+    };
+    let node = crate::shape::declared(node).unwrap();
+    let moving = node.motion("to_world").unwrap();
+    let shape = crate::shape::build(shape).unwrap();
     let shape = Arc::new(shape.geometry);
     let example = |name: &str| match name {
         "envmap" => "<string name='filename' value='any.exr'/>",
@@ -274,30 +305,40 @@ fn every_light(pictures: &Pictures) -> Vec<(&'static str, Light<Rgb>, Arc<Geomet
     };
     let palettes = Palettes::new(Rgb);
     let light = |name: &&'static str| {
+        let on_shape = *name == "area";
+        let own = match *name {
+            "area" | "ambient" => "",
+            _ => motion,
+        };
         let text = format!(
-            "<scene version='3.0.0'><emitter type='{name}'>{}</emitter></scene>",
+            "<scene version='3.0.0'><emitter type='{name}'>{}{own}</emitter></scene>",
             example(name)
         );
         let path = pictures.0.path().join("test.xml");
         let scene = Description::parse(&text, &path, &Options::default()).unwrap();
         let context = LightContext {
             palettes: &palettes,
-            shape: (*name == "area").then_some(&shape),
+            shape: on_shape.then_some(&shape),
+            motion: (on_shape && !moving.is_still()).then_some(&moving),
         };
         let light = Light::build(&scene.root().children(Kind::Emitter)[0], &context);
-        (
-            *name,
-            light.unwrap_or_else(|e| panic!("{e}")),
-            shape.clone(),
-        )
+        let light = light.unwrap_or_else(|e| panic!("{e}"));
+        (*name, light, moving.clone(), shape.clone())
     };
     Light::<Rgb>::NAMES.iter().map(light).collect()
 }
 
 #[test]
 fn every_light_is_drawn_with_the_density_and_the_radiance_that_it_has_there() {
-    let from = Vec3::new(0.2, -0.1, 1.0);
-    for (name, light, shape) in every_light(&Pictures::new()) {
+    let pictures = Pictures::new();
+    let still = every_light(&pictures, "").into_iter().map(|l| (0.0, l));
+    let moving = every_light(&pictures, MOTION).into_iter();
+    let moving = [0.1, 0.4, 0.7]
+        .into_iter()
+        .flat_map(|time| moving.clone().map(move |l| (time, l)));
+    for (time, (name, light, motion, shape)) in still.chain(moving) {
+        let position = Vec3::new(0.2, -0.1, 1.0);
+        let from = Reference { position, time };
         assert_eq!(light.is_ambient(), light.power(&Rgb, 10.0) == 0.0, "{name}");
         let mut drawn = 0;
         for i in 0..500 {
@@ -316,20 +357,21 @@ fn every_light_is_drawn_with_the_density_and_the_radiance_that_it_has_there() {
                 "{name}"
             );
             if let Some(target) = sample.target {
-                let way = (target - from).normalize();
+                let way = (target - position).normalize();
                 assert!(way.distance(sample.direction) < 1e-4, "{name}");
             }
             let (density, radiance) = if light.is_environment() {
-                let radiance = light.environment_radiance(sample.direction, &());
-                (light.environment_pdf(sample.direction), radiance)
+                let radiance = light.environment_radiance(sample.direction, time, &());
+                (light.environment_pdf(sample.direction, time), radiance)
             } else if sample.delta {
                 (1.0, sample.radiance)
             } else {
+                let to_world = motion.at(time);
                 let ray = Ray {
-                    origin: from,
-                    direction: sample.direction,
+                    origin: to_world.inverse().point(position),
+                    direction: to_world.inverse().vector(sample.direction),
                     t_max: f32::INFINITY,
-                    time: 0.0,
+                    time,
                 };
                 let Some((t, u, v)) = shape.intersect(0, &ray) else {
                     continue; // at the rim
@@ -340,15 +382,17 @@ fn every_light_is_drawn_with_the_density_and_the_radiance_that_it_has_there() {
                     v,
                     ..Hit::miss(t)
                 };
-                let at = shape.interaction(&ray, &hit);
+                let at = shape
+                    .interaction(&ray, &hit)
+                    .transformed(&to_world, sample.direction);
                 (
-                    light.surface_pdf(from, &at),
+                    light.surface_pdf(position, &at),
                     light.surface_radiance(&at, &()),
                 )
             };
             assert!(
-                (density / sample.pdf - 1.0).abs() < 2e-3,
-                "{name}: {density} {}",
+                (density / sample.pdf - 1.0).abs() < 5e-3,
+                "{name} at {time}: {density} {}",
                 sample.pdf
             );
             assert!(
@@ -356,6 +400,39 @@ fn every_light_is_drawn_with_the_density_and_the_radiance_that_it_has_there() {
                 "{name}"
             );
         }
-        assert_eq!(drawn == 0, light.is_ambient(), "{name}");
+        assert_eq!(drawn == 0, light.is_ambient(), "{name} at {time}");
     }
+}
+
+/// The density of a light integrates to 1 over all directions, whatever stretches the shape that it stands on.
+#[test]
+fn the_density_of_a_stretched_light_is_one_per_solid_angle() {
+    let lights = every_light(&Pictures::new(), MOTION);
+    let (_, light, motion, shape) = lights.iter().find(|(name, ..)| *name == "area").unwrap();
+    let (time, position) = (1.4, Vec3::new(0.2, -0.1, 1.0));
+    let to_world = motion.at(time);
+    let (mut sum, n) = (0.0, 400_000);
+    for i in 0..n {
+        let direction = crate::lanes::warp::uniform_sphere::<f32>(point(9, i).into()).into();
+        let ray = Ray {
+            origin: to_world.inverse().point(position),
+            direction: to_world.inverse().vector(direction),
+            t_max: f32::INFINITY,
+            time,
+        };
+        if let Some((t, u, v)) = shape.intersect(0, &ray) {
+            let hit = Hit {
+                t,
+                u,
+                v,
+                ..Hit::miss(t)
+            };
+            let at = shape
+                .interaction(&ray, &hit)
+                .transformed(&to_world, direction);
+            sum += f64::from(light.surface_pdf(position, &at));
+        }
+    }
+    let integral = sum * 4.0 * std::f64::consts::PI / f64::from(n);
+    assert!((integral - 1.0).abs() < 0.02, "{integral}");
 }

@@ -574,6 +574,10 @@ impl Source for Block<'_> {
         self.0[lane].at.clone()
     }
 
+    fn time(&self, lane: usize) -> f32 {
+        self.0[lane].at.time
+    }
+
     fn on_mesh(&self, _lane: usize) -> Option<(&Mesh, u32, Vec2)> {
         None
     }

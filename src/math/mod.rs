@@ -4,9 +4,11 @@
 
 pub mod distribution;
 pub mod frame;
+pub mod moving;
 pub mod quadrature;
 pub mod random;
 pub mod transform;
 
 pub use frame::Frame;
+pub use moving::Moving;
 pub use transform::Transform;

@@ -32,6 +32,19 @@ impl Transform {
         (forward.is_finite() && inverse.is_finite()).then_some(Self { forward, inverse })
     }
 
+    /// From both ways, which the caller knows to be each other's inverse.
+    pub(super) fn of_parts(forward: &DAffine3, inverse: &DAffine3) -> Self {
+        Self {
+            forward: forward.as_affine3(),
+            inverse: inverse.as_affine3(),
+        }
+    }
+
+    /// As a matrix of double precision.
+    pub(super) fn forward(&self) -> DAffine3 {
+        self.forward.as_daffine3()
+    }
+
     /// A point.
     #[inline]
     pub fn point(&self, p: Vec3) -> Vec3 {

@@ -82,6 +82,8 @@ pub struct Overrides {
     pub size: Option<(u32, u32)>,
     /// The part of the film to render.
     pub crop: Option<Window>,
+    /// When the shutter opens and closes.
+    pub shutter: Option<(f64, f64)>,
     /// Integrator plugin.
     pub integrator: Option<String>,
     /// The integrator's `max_depth`.
@@ -106,6 +108,10 @@ impl Overrides {
     }
 
     fn apply_to_sensor(&self, description: &mut Description, sensor: NodeId) {
+        if let Some((open, close)) = self.shutter {
+            description.set(sensor, "shutter_open", Value::Float(open));
+            description.set(sensor, "shutter_close", Value::Float(close));
+        }
         let film = description.child_or_new(sensor, Kind::Film, "hdrfilm");
         let mut set =
             |name: &str, value: u32| description.set(film, name, Value::Integer(value.into()));

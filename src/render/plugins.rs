@@ -350,7 +350,9 @@ mod tests {
                 "p2" | "n2" => tagged("vector", "0, 1, 0.5"),
                 _ => tagged("vector", "0, 0, -0.5"),
             },
-            Takes::Transform => format!("<transform name='{name}'><translate x='1'/></transform>"),
+            Takes::Transform | Takes::Motion => {
+                format!("<transform name='{name}'><translate x='1'/></transform>")
+            }
             Takes::Map => format!("<texture name='{name}' type='checkerboard'/>"),
             Takes::Nested(_) => String::new(),
         }

@@ -64,6 +64,8 @@ struct Key {
     colors: Colors,
     method: Method,
     build: Option<Build>,
+    /// The shutter's times, where anything moves.
+    shutter: Option<[u32; 2]>,
 }
 
 /// What is known of a scene beside the scene.
@@ -241,6 +243,8 @@ struct Share {
     film: u64,
     /// How many rays are to be expected.
     rays: u64,
+    /// Their first and their last time.
+    shutter: (f32, f32),
 }
 
 /// What is asked of a scene.
@@ -276,7 +280,11 @@ fn make<C: ColorModel>(
     ask: &Ask<'_>,
     given: Option<ReadMesh>,
     color: C,
-    Share { film, rays }: Share,
+    Share {
+        film,
+        rays,
+        shutter,
+    }: Share,
 ) -> Result<(Scene<C>, Facts, Seconds)> {
     let Ask {
         description,
@@ -325,6 +333,7 @@ fn make<C: ColorModel>(
             method: ask.method(),
             build,
             cache: options.cache.clone(),
+            shutter,
         };
         scene::build(description, &assets, color, recipe)
     })?;
@@ -351,12 +360,6 @@ pub(super) fn prepare<'k, C: ColorModel>(ask: &'k mut Ask<'_>, color: C) -> Resu
     let (description, options) = (ask.description, ask.options);
     let given = ask.shelf.given.take();
     let mut problems = Problems::default();
-    let key = Key {
-        scene: fingerprint::scene_key(description),
-        colors: options.colors,
-        method: ask.method(),
-        build: options.build,
-    };
     let sensor = problems.take(sensor(description, options));
     let view = sensor.and_then(|sensor| problems.take(view::<C>(description, sensor)));
     let view = view.filter(|view| {
@@ -372,9 +375,19 @@ pub(super) fn prepare<'k, C: ColorModel>(ask: &'k mut Ask<'_>, color: C) -> Resu
             options.adaptive.is_some(),
         ),
         rays: rays(&view.film, view.sampler.sample_count()),
+        shutter: view.sensor.shutter(),
     });
     let share = share.unwrap_or_default();
     let film = share.film;
+    let key = Key {
+        scene: fingerprint::scene_key(description),
+        colors: options.colors,
+        method: ask.method(),
+        build: options.build,
+        shutter: description
+            .has_motion()
+            .then(|| [share.shutter.0, share.shutter.1].map(f32::to_bits)),
+    };
     let fresh = |kept: &Kept| kept.key == key && kept.stamps == kept.facts.stamps();
     if !ask.shelf.kept.as_ref().is_some_and(fresh) {
         ask.shelf.kept = None;
@@ -502,7 +515,10 @@ impl<C: ColorModel> Job<'_, C> {
 
     /// How the image was made.
     pub(super) fn metadata(&self, scene_name: &str, report: &Report) -> Metadata {
-        let to_camera = self.view.sensor.world_to_camera();
+        let to_camera = self
+            .view
+            .sensor
+            .world_to_camera(self.view.sensor.shutter().0);
         let metadata = Metadata::default()
             .with("software", concat!("etendue ", env!("CARGO_PKG_VERSION")))
             .with("scene", scene_name)

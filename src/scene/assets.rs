@@ -5,6 +5,9 @@
 //! A `group`, Étendue's own, is a node of a scene graph: it holds shapes, instances and groups, which stand under its
 //! `to_world` (a node's matrix is its parent's times its own), and of which those without a material have the group's.
 //! The graph is flattened here: a shape is loaded for each path that leads to it, in world space.
+//!
+//! What moves is a group of its own with one instance, whose transform has a time: a shape by itself, the shapes of a
+//! node together. A mesh that deforms is such a group too, whether it moves or not.
 
 use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
@@ -16,9 +19,9 @@ use super::files::{self, Site};
 use crate::accel::Instance;
 use crate::description::{Description, Kind, NodeId, Properties};
 use crate::error::{Error, Problem, Problems, Result};
-use crate::math::Transform;
+use crate::math::Moving;
 use crate::mesh::ReadMesh;
-use crate::shape::{self, Geometry, Setting};
+use crate::shape::{self, Geometry, Placement, Setting};
 
 /// The geometry of a scene, loaded: it does not depend on colour, sensor or film.
 #[derive(Debug)]
@@ -38,6 +41,8 @@ pub(super) struct Member {
     pub(super) group: u32,
     /// The material that it has from a group around it, unless it has its own.
     pub(super) bsdf: Option<NodeId>,
+    /// From its group's space to the world, where it moves.
+    pub(super) motion: Option<Moving>,
     /// In its group's space.
     pub(super) geometry: Arc<Geometry>,
 }
@@ -91,6 +96,7 @@ impl Assets {
                     node: properties.node_id(),
                     group: space.group,
                     bsdf: space.bsdf,
+                    motion: space.motion.clone(),
                     geometry: Arc::new(shape.geometry),
                 });
             }
@@ -153,13 +159,15 @@ struct Planned<'a> {
 }
 
 /// Where a shape stands.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 struct Space<'a> {
     /// The `shapegroup`, if it is in one.
     shapegroup: Option<Properties<'a>>,
-    /// Its number; 0 for the world.
+    /// The number of the `shapegroup`, or of what moves together; 0 for the world.
     group: u32,
-    /// The product of the transforms of the groups around it, the outermost first.
+    /// From the space of what moves to the world.
+    motion: Option<Moving>,
+    /// The product of the transforms of the groups around it, the outermost first, as far as they stand still.
     outer: DMat4,
     /// The material of the nearest of those groups that has one.
     bsdf: Option<NodeId>,
@@ -176,6 +184,8 @@ struct Plan<'a> {
     shapes: Vec<Planned<'a>>,
     /// The shapegroups' numbers, from 1.
     groups: HashMap<NodeId, u32>,
+    /// How many groups there are, with those of what moves.
+    group_count: u32,
     instances: Vec<Instance>,
     /// How many shapes were met in groups, each as often as it is referred to.
     met: usize,
@@ -213,7 +223,8 @@ impl<'a> Plan<'a> {
                         self.problems.push(error.at(emitter.location()));
                     }
                 }
-                let space = *space;
+                let moving = Placement::of(&properties)?.moving;
+                let space = self.moved(&properties, space, moving)?;
                 self.shapes.push(Planned { properties, space });
                 Ok(())
             }
@@ -222,18 +233,73 @@ impl<'a> Plan<'a> {
 
     /// Notes the shapes of a node of the scene graph. Nodes are not nested without end.
     fn node(&mut self, properties: &Properties<'a>, space: &Space<'a>) -> Result<()> {
-        let own = properties.transform("to_world")?;
+        let own = Placement::of(properties)?;
         let bsdf = properties.child(Kind::Bsdf)?;
-        let inner = Space {
-            outer: space.outer * own,
-            bsdf: bsdf.map(|bsdf| bsdf.node_id()).or(space.bsdf),
-            top: false,
-            ..*space
-        };
+        let mut inner = self.moved(properties, space, own.moving)?;
+        inner.outer *= own.still;
+        inner.bsdf = bsdf.map(|bsdf| bsdf.node_id()).or(space.bsdf);
+        inner.top = false;
         for child in properties.children(Kind::Shape) {
             self.place(child, &inner)?;
         }
         Ok(())
+    }
+
+    /// The space of what moves in `space`; `space` itself where nothing does.
+    fn moved(
+        &mut self,
+        properties: &Properties<'a>,
+        space: &Space<'a>,
+        moving: Option<Moving>,
+    ) -> Result<Space<'a>> {
+        let deforms = shape::deforms(properties);
+        if moving.is_none() && !deforms {
+            return Ok(space.clone());
+        }
+        if let Some(group) = space.shapegroup {
+            let message = "what is in a shapegroup cannot move by itself, nor deform";
+            return Err(properties
+                .error("to_world", message)
+                .help("animate the instance, or a shape that is in no shapegroup")
+                .related(group.location(), "the group"));
+        }
+        self.group_count += 1;
+        if moving.is_none() {
+            // It moves with what is around it, and has a tree of its own.
+            self.instances.push(Instance {
+                to_world: space.motion.clone().unwrap_or(Moving::IDENTITY),
+                group: self.group_count,
+            });
+            return Ok(Space {
+                group: self.group_count,
+                ..space.clone()
+            });
+        }
+        let motion = self.motion(properties, space, &DMat4::IDENTITY, moving.as_ref())?;
+        self.instances.push(Instance {
+            to_world: motion.clone(),
+            group: self.group_count,
+        });
+        Ok(Space {
+            group: self.group_count,
+            motion: Some(motion),
+            outer: DMat4::IDENTITY,
+            ..space.clone()
+        })
+    }
+
+    /// The product of all that is around what `properties` name, of `still` and of `moving`.
+    fn motion(
+        &self,
+        properties: &Properties<'a>,
+        space: &Space<'a>,
+        still: &DMat4,
+        moving: Option<&Moving>,
+    ) -> Result<Moving> {
+        let still = space.outer * *still;
+        Moving::product(space.motion.as_ref(), &still, moving).ok_or_else(|| {
+            properties.error("to_world", "the transform must be affine and invertible")
+        })
     }
 
     /// The shapegroup's number.
@@ -241,7 +307,8 @@ impl<'a> Plan<'a> {
         if let Some(group) = self.groups.get(&properties.node_id()) {
             return *group;
         }
-        let group = self.groups.len() as u32 + 1;
+        self.group_count += 1;
+        let group = self.group_count;
         self.groups.insert(properties.node_id(), group);
         let space = Space {
             shapegroup: Some(properties),
@@ -276,11 +343,8 @@ impl<'a> Plan<'a> {
                 .error("", message)
                 .related(group.location(), "this"));
         }
-        let own = properties.transform("to_world")?;
-        let matrix = space.outer * own;
-        let to_world = Transform::new(&matrix).ok_or_else(|| {
-            properties.error("to_world", "the transform must be affine and invertible")
-        })?;
+        let own = Placement::of(properties)?;
+        let to_world = self.motion(properties, space, &own.still, own.moving.as_ref())?;
         let group = self.shapegroup(group);
         self.instances.push(Instance { to_world, group });
         Ok(())
@@ -292,6 +356,7 @@ impl Space<'_> {
     const WORLD: Self = Self {
         shapegroup: None,
         group: 0,
+        motion: None,
         outer: DMat4::IDENTITY,
         bsdf: None,
         top: true,
@@ -324,7 +389,7 @@ mod tests {
         assert_eq!(groups, [1, 1, 0, 2]);
         let of: Vec<u32> = assets.instances.iter().map(|i| i.group).collect();
         assert_eq!(of, [1, 1, 2]);
-        assert_eq!(assets.instances[1].to_world.translation().x, 3.0);
+        assert_eq!(assets.instances[1].to_world.at(0.0).translation().x, 3.0);
         assert_eq!(assets.primitive_count(), 12 + 1 + 1 + 1);
     }
 
@@ -374,7 +439,7 @@ mod tests {
         assert_eq!(assets.shapes[1].bsdf, assets.shapes[4].bsdf);
         assert_ne!(assets.shapes[0].bsdf, assets.shapes[1].bsdf);
         let x: Vec<f32> = (assets.instances.iter())
-            .map(|i| i.to_world.translation().x)
+            .map(|i| i.to_world.at(0.0).translation().x)
             .collect();
         assert_eq!(x, [2.0, 1.0]);
     }

@@ -2,7 +2,6 @@
 //! and all that is wrong is gathered before any of it is reported.
 
 use std::collections::{HashMap, HashSet};
-use std::sync::Arc;
 
 use super::assets::{MAX_SHAPES, Member};
 use super::choice::Choice;
@@ -53,15 +52,12 @@ impl<C: ColorModel> Builder<'_, C> {
         Some(id)
     }
 
-    /// Adds a light, and says where it is if it is somewhere.
-    fn light(
-        &mut self,
-        properties: &Properties<'_>,
-        shape: Option<&Arc<Geometry>>,
-    ) -> Option<LightId> {
+    /// Adds a light, which stands on a shape or on none, and says where it is if it is somewhere.
+    fn light(&mut self, properties: &Properties<'_>, stands: Option<&Member>) -> Option<LightId> {
         let context = LightContext {
             palettes: &self.palettes,
-            shape,
+            shape: stands.map(|member| &member.geometry),
+            motion: stands.and_then(|member| member.motion.as_ref()),
         };
         let light = self.problems.take(Light::build(properties, &context))?;
         if light.is_ambient() {
@@ -144,9 +140,18 @@ impl<C: ColorModel> Builder<'_, C> {
                 );
                 None
             }
+            Some(emitter) if matches!(**geometry, Geometry::Deforming(_)) => {
+                let error = Error::unsupported("a mesh that deforms cannot be a light");
+                self.problems.push(
+                    error
+                        .at(emitter.location())
+                        .help("let a mesh emit that keeps its shape; it may move"),
+                );
+                None
+            }
             Some(emitter) => {
                 self.worn.insert(emitter.node_id());
-                self.light(emitter, Some(geometry))
+                self.light(emitter, Some(member))
             }
             None => None,
         };

@@ -12,7 +12,7 @@ use glam::Vec3;
 use crate::accel::{Counts, Order, Tracer};
 use crate::color::{ColorModel, Spectral};
 use crate::error::Problem;
-use crate::interaction::{Hit, Interaction, Ray};
+use crate::interaction::{Hit, Interaction, Points, Ray};
 use crate::lanes::{self, Ints as _, Kernel, Lanes, Mask as _};
 use crate::light::{Light, LightSamples};
 use crate::material::Material;
@@ -176,11 +176,10 @@ impl<C: ColorModel> Scene<C> {
     #[inline(always)]
     pub fn sample_lights<F: Lanes>(
         &self,
-        from: lanes::Vec3<F>,
+        from: &Points<'_, F>,
         u1: F,
         u2: lanes::Vec2<F>,
         w: &[C::Wavelengths],
-        active: F::Mask,
     ) -> LightSamples<F, C::Columns<F>> {
         let mut samples = LightSamples::none();
         let Some(chosen) = self.choice.sample(u1) else {
@@ -189,7 +188,7 @@ impl<C: ColorModel> Scene<C> {
         let mut indices = F::Int::ROW;
         chosen.store(&mut indices);
         // One light after another.
-        let mut rest = active;
+        let mut rest = from.active;
         while let Some(lane) = rest.lanes().next() {
             let light = LightId(indices[lane]);
             let mask = rest & chosen.eq(F::Int::splat(light.0));
@@ -218,13 +217,13 @@ impl<C: ColorModel> Scene<C> {
         })
     }
 
-    /// The same for a direction in which a ray meets nothing.
-    pub fn surrounding(&self, direction: Vec3, w: &C::Wavelengths) -> Option<(C::Sample, f32)> {
+    /// The same for a ray that meets nothing.
+    pub fn surrounding(&self, ray: &Ray, w: &C::Wavelengths) -> Option<(C::Sample, f32)> {
         let id = self.environment?;
         let light = self.light(id);
-        let radiance = light.environment_radiance(direction, w);
+        let radiance = light.environment_radiance(ray.direction, ray.time, w);
         (!radiance.is_black()).then(|| {
-            let pdf = light.environment_pdf(direction) * self.choice.probability(id);
+            let pdf = light.environment_pdf(ray.direction, ray.time) * self.choice.probability(id);
             (radiance, pdf)
         })
     }

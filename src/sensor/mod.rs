@@ -7,12 +7,12 @@ mod thinlens;
 
 use glam::{Mat4, Vec2, Vec3};
 
-use crate::description::declared::{Row, float, nested, transform};
+use crate::description::declared::{Row, float, motion, nested};
 use crate::description::{Kind, Properties};
 use crate::error::Result;
 use crate::family::family;
 use crate::interaction::Ray;
-use crate::math::Transform;
+use crate::math::Moving;
 
 pub use film::{Coordinates, FILMS, Film, PixelFormat, Window};
 pub(crate) use perspective::{FIELD_OF_VIEW, tangent_x};
@@ -26,8 +26,8 @@ pub trait Camera: std::fmt::Debug + Send + Sync {
     fn has_lens(&self) -> bool {
         false
     }
-    /// From world to camera space: z forward, y up, x to the image's left.
-    fn world_to_camera(&self) -> Mat4;
+    /// From world to camera space at `time`: z forward, y up, x to the image's left.
+    fn world_to_camera(&self, time: f32) -> Mat4;
     /// From camera space to clip space: x right and y up in [−1, 1], z in [0, 1] from near to far.
     fn projection(&self) -> Mat4;
     /// The rays through the points of the film that lie a `step` (in units of the film, as in [`Camera::ray`]) further to
@@ -50,7 +50,7 @@ family! {
 /// What all sensors have in common.
 #[derive(Clone, Debug)]
 struct Mount {
-    to_world: Transform,
+    to_world: Moving,
     near: f32,
     far: f32,
     shutter: (f32, f32),
@@ -58,7 +58,7 @@ struct Mount {
 
 /// What every sensor reads.
 const MOUNT: &[Row] = &[
-    transform(
+    motion(
         "to_world",
         "from camera space (z forward, y up, x to the left) to the world",
     ),
@@ -73,13 +73,7 @@ const MOUNT: &[Row] = &[
 
 impl Mount {
     fn build(properties: &Properties<'_>) -> Result<Self> {
-        let matrix = properties.transform("to_world")?;
-        let Some(to_world) = Transform::new(&matrix) else {
-            return Err(properties.error(
-                "to_world",
-                "the sensor's transform must be affine and invertible",
-            ));
-        };
+        let to_world = properties.motion("to_world")?;
         let near = properties.float("near_clip")?;
         let far = properties.float("far_clip")?;
         if far <= near {
@@ -100,16 +94,17 @@ impl Mount {
         })
     }
 
-    fn world_to_camera(&self) -> Mat4 {
-        let inverse = self.to_world.inverse();
+    fn world_to_camera(&self, time: f32) -> Mat4 {
+        let inverse = self.to_world.at(time).inverse();
         Mat4::from_translation(inverse.translation()) * Mat4::from_mat3(inverse.linear())
     }
 
     /// The ray from the camera-space point `start` to `end`.
     fn ray(&self, start: Vec3, end: Vec3, time: f32) -> Ray {
-        let origin = self.to_world.point(start);
+        let to_world = self.to_world.at(time);
+        let origin = to_world.point(start);
         // Through the linear part: the difference of two far points would cancel.
-        let way = self.to_world.vector(end - start);
+        let way = to_world.vector(end - start);
         let length = way.length();
         Ray {
             origin,
@@ -158,7 +153,7 @@ mod tests {
                 assert!((ray.direction.length() - 1.0).abs() < 1e-5, "{name}");
                 for (t, depth) in [(0.0, 0.0), (ray.t_max, 1.0)] {
                     let world = ray.at(t).extend(1.0);
-                    let clip = sensor.projection() * sensor.world_to_camera() * world;
+                    let clip = sensor.projection() * sensor.world_to_camera(0.0) * world;
                     let found = clip.truncate() / clip.w;
                     let expected = Vec3::new(2.0 * x - 1.0, 1.0 - 2.0 * y, depth);
                     assert!(

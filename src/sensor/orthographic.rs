@@ -45,15 +45,16 @@ impl Camera for Orthographic {
     }
 
     fn neighbours(&self, ray: &Ray, step: Vec2) -> [Ray; 2] {
+        let to_world = self.mount.to_world.at(ray.time);
         let way = -2.0 * step * self.half;
         [Vec3::X * way.x, Vec3::Y * way.y].map(|way| Ray {
-            origin: ray.origin + self.mount.to_world.vector(way),
+            origin: ray.origin + to_world.vector(way),
             ..*ray
         })
     }
 
-    fn world_to_camera(&self) -> Mat4 {
-        self.mount.world_to_camera()
+    fn world_to_camera(&self, time: f32) -> Mat4 {
+        self.mount.world_to_camera(time)
     }
 
     fn projection(&self) -> Mat4 {

@@ -139,7 +139,7 @@ impl Perspective {
 
     /// The rays beside `ray`, from points that lie by `spread` of the way between them beside its origin.
     pub(super) fn rays_beside(&self, ray: &Ray, step: Vec2, spread: f32) -> [Ray; 2] {
-        let Mount { to_world, .. } = &self.mount;
+        let to_world = self.mount.to_world.at(ray.time);
         let way = to_world.inverse().vector(ray.direction);
         let way = way / way.z;
         let steps = -2.0 * step * self.half;
@@ -171,8 +171,8 @@ impl Camera for Perspective {
         self.rays_beside(ray, step, 0.0)
     }
 
-    fn world_to_camera(&self) -> Mat4 {
-        self.mount.world_to_camera()
+    fn world_to_camera(&self, time: f32) -> Mat4 {
+        self.mount.world_to_camera(time)
     }
 
     fn projection(&self) -> Mat4 {
@@ -255,7 +255,7 @@ mod tests {
         let place = Vec2::new(0.8, 0.3);
         let ray = camera.ray(place, Vec2::ZERO, 0.0);
         for (t, depth) in [(0.0, 0.0), (ray.t_max, 1.0)] {
-            let clip = camera.projection() * camera.world_to_camera() * ray.at(t).extend(1.0);
+            let clip = camera.projection() * camera.world_to_camera(0.0) * ray.at(t).extend(1.0);
             let ndc = clip.truncate() / clip.w;
             let expected = Vec3::new(2.0 * place.x - 1.0, 1.0 - 2.0 * place.y, depth);
             assert!((ndc - expected).length() < 2e-3, "{ndc} {expected}");

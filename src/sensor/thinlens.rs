@@ -136,8 +136,8 @@ impl Camera for ThinLens {
         true
     }
 
-    fn world_to_camera(&self) -> Mat4 {
-        self.pinhole.world_to_camera()
+    fn world_to_camera(&self, time: f32) -> Mat4 {
+        self.pinhole.world_to_camera(time)
     }
 
     fn projection(&self) -> Mat4 {

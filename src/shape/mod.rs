@@ -1,6 +1,7 @@
 //! Shapes: what a scene's `<shape>` plugins build. Most build a triangle mesh, some a surface with an
 //! equation of its own; everything above sees a [`Geometry`].
 
+mod deforming;
 mod disk;
 mod frustum;
 mod mesh;
@@ -26,16 +27,17 @@ use std::path::{Path, PathBuf};
 use glam::{DAffine3, DMat3, DMat4, DVec3, Vec2, Vec3};
 
 use crate::description::declared::{
-    Plugin, Plugins, Row, boolean, file, float, nested, number, transform,
+    Plugin, Plugins, Row, boolean, file, float, motion, nested, number, string, transform,
 };
 use crate::description::{Kind, Properties};
 use crate::error::{Problem, Result};
 use crate::family;
 use crate::interaction::{Hit, Interaction, Ray, offset};
 use crate::lanes::{self, Lanes, Mask as _};
-use crate::math::Transform;
+use crate::math::{Moving, Transform};
 use crate::mesh::{Loaded, Mesh, MeshFile, ReadOptions, read};
 
+pub use deforming::{DeformingMesh, Moment};
 pub use disk::Disk;
 pub use frustum::Frustum;
 pub use mesh::{TriangleMesh, Triangles};
@@ -106,6 +108,19 @@ impl Bounds {
         Self {
             min: min + origin - error,
             max: max + origin + error,
+        }
+    }
+
+    /// A box around the box's images at all times of an interval (first, last), with room for rounding.
+    #[must_use]
+    pub fn moved(self, moving: &Moving, interval: (f32, f32)) -> Self {
+        match moving {
+            Moving::Still(transform) => self.transformed(transform),
+            _ if self.is_empty() => self,
+            Moving::Keyed(_) => {
+                let [min, max] = moving.swept([self.min, self.max], interval);
+                Self { min, max }
+            }
         }
     }
 
@@ -205,6 +220,8 @@ pub trait Surface: std::fmt::Debug + Send + Sync {
 pub enum Geometry {
     /// Triangles.
     Mesh(TriangleMesh),
+    /// Triangles whose corners move.
+    Deforming(DeformingMesh),
     /// A disk.
     Disk(Disk),
     /// A cylinder or a cone.
@@ -220,6 +237,7 @@ impl Geometry {
     pub fn mesh(&self) -> Option<&Mesh> {
         match self {
             Self::Mesh(mesh) => Some(mesh.mesh()),
+            Self::Deforming(mesh) => Some(mesh.mesh()),
             _ => None,
         }
     }
@@ -266,6 +284,7 @@ impl std::ops::Deref for Geometry {
     fn deref(&self) -> &Self::Target {
         match self {
             Self::Mesh(mesh) => mesh,
+            Self::Deforming(mesh) => mesh,
             Self::Disk(disk) => disk,
             Self::Frustum(frustum) => frustum,
             Self::Plane(plane) => plane,
@@ -337,7 +356,7 @@ fn single(properties: &Properties<'_>) -> Option<&'static Build> {
 }
 
 /// From a shape's space to that in which it stands.
-const TO_WORLD: Row = transform("to_world", "from the shape's space to the world");
+const TO_WORLD: Row = motion("to_world", "from the shape's space to the world");
 /// Which side is the front.
 const FLIP_NORMALS: Row = boolean("flip_normals", false, "whether the other side is the front");
 const BSDF: Row = nested(Kind::Bsdf, "how it scatters light; diffuse without one");
@@ -396,6 +415,8 @@ const MESH: &[Row] = &[
 /// What every mesh from a file reads.
 const FILE: &[Row] = &[
     file("filename", "the mesh"),
+    file("filename_#", "the same mesh at later times, from filename_1 on: it deforms, and goes straight from each to the next").absent("none").own(),
+    string("times", "", "when those are, and the first before them: as many numbers, ascending").absent("evenly from 0 to 1").own(),
     boolean("flip_tex_coords", false, "whether v runs from the top")
         .absent("true for obj, else false"),
     boolean("bare", false, "whether the file is read as one without a scene: with its colours, its concave polygons as they are, and near the origin").own(),
@@ -426,7 +447,7 @@ const COMPOUND: Plugins = &[
         &Plugin {
             about: "a shapegroup once more",
             properties: &[&[
-                transform("to_world", "from the group's space to the world"),
+                motion("to_world", "from the group's space to the world"),
                 nested(Kind::Shape, "the shapegroup, by reference"),
             ]],
         },
@@ -481,7 +502,7 @@ pub fn build_within(setting: &Setting<'_>, properties: &Properties<'_>) -> Resul
             let file = mesh::file(properties, options(properties)?)?;
             let loaded = read(&file.path, &file.options);
             let loaded = loaded.map_err(|e| e.named_at(properties.location()))?;
-            mesh::place_file(loaded, properties, setting)
+            from_file(loaded, properties, setting)
         }
         None => {
             let message = format!("a {} is put together by the scene", properties.plugin());
@@ -505,12 +526,76 @@ pub fn build_from(
     setting: &Setting<'_>,
     properties: &Properties<'_>,
 ) -> Result<Shape> {
-    mesh::place_file(loaded, &declared(properties)?, setting)
+    from_file(loaded, &declared(properties)?, setting)
+}
+
+/// The shape that a plugin makes of its file, and of those of later times.
+fn from_file(loaded: Loaded, properties: &Properties<'_>, setting: &Setting<'_>) -> Result<Shape> {
+    let shape = mesh::place_file(loaded, properties, setting)?;
+    let Some(Build::Read(options)) = single(properties) else {
+        return Ok(shape);
+    };
+    let Some(times) = deforming::times(properties)? else {
+        return Ok(shape);
+    };
+    let mut shapes = vec![shape];
+    for number in 1..times.len() {
+        let name = deforming::file_name(number);
+        let file = MeshFile {
+            path: properties.file(&name)?,
+            ..mesh::file(properties, options(properties)?)?
+        };
+        let loaded = read(&file.path, &file.options);
+        let loaded = loaded.map_err(|e| e.named_at(properties.location()))?;
+        shapes.push(mesh::place_file(loaded, properties, setting)?);
+    }
+    deforming::joined(shapes, times, properties)
+}
+
+/// Whether the shape deforms, so that it has to stand in a group of its own.
+pub(crate) fn deforms(properties: &Properties<'_>) -> bool {
+    properties.has(&deforming::file_name(1))
 }
 
 /// The property `to_world`, the identity by default, and then `outer`.
 fn to_world(properties: &Properties<'_>, outer: &DMat4) -> Result<DMat4> {
-    Ok(*outer * properties.transform("to_world")?)
+    Ok(*outer * Placement::of(properties)?.still)
+}
+
+/// The property `to_world` of a shape.
+#[derive(Clone, Debug)]
+pub struct Placement {
+    /// What stands still: the whole, unless it moves.
+    pub still: DMat4,
+    /// What moves; then that which stands still is the identity.
+    pub moving: Option<Moving>,
+}
+
+impl Placement {
+    /// Of what `properties` name.
+    ///
+    /// # Errors
+    /// Where it makes no motion.
+    pub fn of(properties: &Properties<'_>) -> Result<Self> {
+        let Some(keyframes) = properties.animation("to_world")? else {
+            let still = properties.transform("to_world")?;
+            return Ok(Self {
+                still,
+                moving: None,
+            });
+        };
+        let moving = properties.motion("to_world")?;
+        Ok(match moving.is_still() {
+            true => Self {
+                still: keyframes[0].1,
+                moving: None,
+            },
+            false => Self {
+                still: DMat4::IDENTITY,
+                moving: Some(moving),
+            },
+        })
+    }
 }
 
 /// A bound, for each axis, on the error of a world position that was computed in double precision from the

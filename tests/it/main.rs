@@ -17,6 +17,7 @@ mod layers;
 mod lights;
 mod mesh;
 mod mitsuba_data;
+mod motion;
 mod opacity;
 mod phong;
 mod profile;

@@ -141,6 +141,7 @@ impl Sketches {
             nodes,
             blocks,
             levels,
+            later: None,
         };
         (tree, others)
     }

@@ -12,7 +12,8 @@ use std::hint::select_unpredictable;
 
 use super::kernel::{Ends, FILED, Lanes};
 use super::node::{
-    BLOCK, BLOCK_INDEX, DONE, EXIT, Entry, LEAF, LEAVE, OTHER, OTHER_INDEX, WIDTH, triangles_of,
+    BLOCK, BLOCK_INDEX, Block, DONE, EXIT, Entry, LEAF, LEAVE, OTHER, OTHER_INDEX, WIDTH,
+    triangles_of,
 };
 use super::state::{Best, Flight, Start, State};
 use super::{Met, Tree, Walker};
@@ -50,7 +51,7 @@ impl Stacks {
     /// # Safety
     /// The ray is at a node of the tree, its stack is in its place, and the processor has `L`.
     #[inline(always)]
-    unsafe fn step<L: Lanes, const ANY: bool>(self, ray: &mut State) {
+    unsafe fn step<L: Lanes, const ANY: bool, const LATER: bool>(self, ray: &mut State) {
         let top = ray.top as usize;
         // SAFETY: below the top are eight sentinels at least, above it room for eight children.
         unsafe {
@@ -60,8 +61,14 @@ impl Stacks {
             } else {
                 self.below::<L>(ray)
             };
-            let node = &*ray.nodes.add(ray.current as usize);
-            let count = L::enter(node, ray, self.start.add(top));
+            let index = ray.current as usize;
+            let node = &*ray.nodes.add(index);
+            let count = if LATER && !ray.later_nodes.is_null() {
+                let node = node.toward(&*ray.later_nodes.add(index), ray.part);
+                L::enter(&node, ray, self.start.add(top))
+            } else {
+                L::enter(node, ray, self.start.add(top))
+            };
             ray.top = select_unpredictable(count == 0, below, top as u32 + count - 1);
             ray.current = *self.start.add(ray.top as usize) as u32;
         }
@@ -100,10 +107,15 @@ impl Stacks {
     /// # Safety
     /// The ray is at a block of the tree, and the processor has `L`.
     #[inline(always)]
-    unsafe fn inside<L: Lanes>(self, ray: &mut State) -> u32 {
+    unsafe fn inside<L: Lanes, const LATER: bool>(self, ray: &mut State) -> u32 {
         let index = (ray.current & BLOCK_INDEX) as usize;
-        // SAFETY: the index is a block's.
-        let lanes = unsafe { L::inside(&*ray.blocks.add(index), ray) };
+        // SAFETY: the index is a block's, and the caller has what `L` needs.
+        let lanes = unsafe {
+            match LATER && !ray.later_blocks.is_null() {
+                true => L::inside(&block::<LATER>(ray, index), ray),
+                false => L::inside(&*ray.blocks.add(index), ray),
+            }
+        };
         ray.lanes = lanes as u8;
         lanes
     }
@@ -113,13 +125,18 @@ impl Stacks {
     /// # Safety
     /// As [`Stacks::inside`].
     #[inline(always)]
-    unsafe fn meet<L: Lanes>(self, ray: &mut State) -> bool {
+    unsafe fn meet<L: Lanes, const LATER: bool>(self, ray: &mut State) -> bool {
         let index = ray.current & BLOCK_INDEX;
-        // SAFETY: the index is a block's.
-        let block = unsafe { &*ray.blocks.add(index as usize) };
-        // SAFETY: the caller has what `L` needs.
-        let (t, lane) = unsafe { L::meet(block, ray) };
-        let (id, limit) = (block.ids[lane], ray.limit());
+        // SAFETY: the index is a block's, and the caller has what `L` needs.
+        let (t, lane, id) = unsafe {
+            let standing = &*ray.blocks.add(index as usize);
+            let (t, lane) = match LATER && !ray.later_blocks.is_null() {
+                true => L::meet(&block::<LATER>(ray, index as usize), ray),
+                false => L::meet(standing, ray),
+            };
+            (t, lane, standing.ids[lane])
+        };
+        let limit = ray.limit();
         let better = (t < limit) | ((t == limit) & (id < ray.id));
         ray.reach(select_unpredictable(better, t, limit));
         ray.id = select_unpredictable(better, id, ray.id);
@@ -133,7 +150,7 @@ impl Stacks {
     /// # Safety
     /// As [`Stacks::step`]; above the top is room for an entry and for what the walker's inner trees leave.
     #[inline(always)]
-    unsafe fn others<'t, L: Lanes, W: Walker<'t>, const ANY: bool>(
+    unsafe fn others<'t, L: Lanes, W: Walker<'t>, const ANY: bool, const LATER: bool>(
         self,
         ray: &mut State,
         tree: &'t Tree,
@@ -141,7 +158,7 @@ impl Stacks {
     ) {
         while ray.current >= OTHER && ray.current != DONE {
             if ray.current == LEAVE {
-                found::<W, ANY>(walker, ray);
+                found::<W, ANY, LATER>(walker, ray);
                 let start = walker.start(ray.ray as usize);
                 // SAFETY: the caller has what `L` needs.
                 unsafe { enter::<L>(ray, tree, &start) };
@@ -161,7 +178,7 @@ impl Stacks {
                     }
                     Met::Instance(inner, start) => {
                         assert!(inner.levels <= self.inner_levels, "room for the tree");
-                        found::<W, ANY>(walker, ray);
+                        found::<W, ANY, LATER>(walker, ray);
                         // SAFETY: there is room, and the caller has what `L` needs.
                         unsafe {
                             *self.start.add(ray.top as usize) = EXIT;
@@ -199,9 +216,25 @@ impl Stacks {
     }
 }
 
+/// A block as it stands at the ray's time.
+///
+/// # Safety
+/// The index is a block's of the tree that the ray is in.
+#[inline(always)]
+unsafe fn block<const LATER: bool>(ray: &State, index: usize) -> Block {
+    // SAFETY: the caller's word; where blocks move there is an end of the way for each.
+    unsafe {
+        let block = &*ray.blocks.add(index);
+        match LATER && !ray.later_blocks.is_null() {
+            true => block.toward(&*ray.later_blocks.add(index), ray.part),
+            false => *block,
+        }
+    }
+}
+
 /// Hands a triangle of the tree that the ray is in to the walker, if it is the best.
 #[inline(always)]
-fn found<'t, W: Walker<'t>, const ANY: bool>(walker: &mut W, ray: &State) {
+fn found<'t, W: Walker<'t>, const ANY: bool, const LATER: bool>(walker: &mut W, ray: &State) {
     let best = ray.best();
     if !best.is_inside() {
         return;
@@ -209,7 +242,7 @@ fn found<'t, W: Walker<'t>, const ANY: bool>(walker: &mut W, ray: &State) {
     let mut uv = (0.0, 0.0);
     if !ANY {
         // SAFETY: the place is a triangle's in the tree that the ray is in.
-        let block = unsafe { &*ray.blocks.add(ray.place as usize / BLOCK) };
+        let block = unsafe { block::<LATER>(ray, ray.place as usize / BLOCK) };
         let corners = block.triangle(ray.place as usize % BLOCK);
         uv = Shear::barycentric(ray.shear().edges(corners));
     }
@@ -249,7 +282,14 @@ unsafe fn enter<L: Lanes>(ray: &mut State, tree: &Tree, start: &Start) {
 /// # Safety
 /// The processor has the instructions of `L`, and `flight` was made for more levels than the tree has.
 #[inline(always)]
-pub(super) unsafe fn batch<'t, L: Lanes, W: Walker<'t>, const ANY: bool, const FETCH: bool>(
+pub(super) unsafe fn batch<
+    't,
+    L: Lanes,
+    W: Walker<'t>,
+    const ANY: bool,
+    const FETCH: bool,
+    const LATER: bool,
+>(
     tree: &'t Tree,
     walker: &mut W,
     count: usize,
@@ -292,7 +332,7 @@ pub(super) unsafe fn batch<'t, L: Lanes, W: Walker<'t>, const ANY: bool, const F
             node_steps += node_count as u64;
             for i in 0..node_count {
                 let ray = &mut *states.add(*nodes.add(i) as usize);
-                stacks.step::<L, ANY>(ray);
+                stacks.step::<L, ANY, LATER>(ray);
                 *currents.add(i) = ray.current;
                 if FETCH {
                     stacks.fetch(ray);
@@ -311,12 +351,12 @@ pub(super) unsafe fn batch<'t, L: Lanes, W: Walker<'t>, const ANY: bool, const F
                 let ray = &mut *states.add(slot as usize);
                 triangle_tests += triangles_of(ray.current);
                 *inside.add(inside_count) = slot;
-                inside_count += usize::from(stacks.inside::<L>(ray) != 0);
+                inside_count += usize::from(stacks.inside::<L, LATER>(ray) != 0);
             }
             for i in 0..inside_count {
                 let slot = *inside.add(i);
                 let ray = &mut *states.add(slot as usize);
-                let better = stacks.meet::<L>(ray);
+                let better = stacks.meet::<L, LATER>(ray);
                 if ANY {
                     // At the bottom nothing is left to be visited.
                     let bottom = bottoms.get_unchecked(slot as usize) + 1;
@@ -338,9 +378,9 @@ pub(super) unsafe fn batch<'t, L: Lanes, W: Walker<'t>, const ANY: bool, const F
             for i in 0..rest_count {
                 let slot = *rest.add(i);
                 let ray = &mut *states.add(slot as usize);
-                stacks.others::<L, W, ANY>(ray, tree, walker);
+                stacks.others::<L, W, ANY, LATER>(ray, tree, walker);
                 if ray.current == DONE {
-                    found::<W, ANY>(walker, ray);
+                    found::<W, ANY, LATER>(walker, ray);
                     if next == count {
                         continue;
                     }

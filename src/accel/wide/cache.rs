@@ -202,6 +202,7 @@ impl Entry {
             nodes,
             blocks,
             levels,
+            later: None,
         };
         Ok((tree, others))
     }

@@ -8,8 +8,8 @@ use super::{Flight, Tree, Walker};
 use crate::accel::Counts;
 use crate::lanes::{Kernel, Set};
 
-/// Walks `count` rays; with `FETCH`, asks for memory ahead.
-pub(super) fn batch<'t, W: Walker<'t>, const ANY: bool, const FETCH: bool>(
+/// Walks `count` rays; with `FETCH`, asks for memory ahead, with `LATER`, through trees that move.
+pub(super) fn batch<'t, W: Walker<'t>, const ANY: bool, const FETCH: bool, const LATER: bool>(
     kernel: Kernel,
     tree: &'t Tree,
     walker: &mut W,
@@ -22,12 +22,14 @@ pub(super) fn batch<'t, W: Walker<'t>, const ANY: bool, const FETCH: bool>(
     unsafe {
         match kernel.set() {
             Set::Portable => {
-                walks::batch::<Portable, W, ANY, FETCH>(tree, walker, count, flight, counts);
+                walks::batch::<Portable, W, ANY, FETCH, LATER>(tree, walker, count, flight, counts);
             }
             #[cfg(target_arch = "x86_64")]
-            Set::Avx2 => avx2::batch::<W, ANY, FETCH>(tree, walker, count, flight, counts),
+            Set::Avx2 => avx2::batch::<W, ANY, FETCH, LATER>(tree, walker, count, flight, counts),
             #[cfg(target_arch = "x86_64")]
-            Set::Avx512 => avx512::batch::<W, ANY, FETCH>(tree, walker, count, flight, counts),
+            Set::Avx512 => {
+                avx512::batch::<W, ANY, FETCH, LATER>(tree, walker, count, flight, counts)
+            }
         }
     }
 }
@@ -43,7 +45,13 @@ macro_rules! compile {
             /// # Safety
             /// As for the walk itself.
             #[target_feature(enable = $features)]
-            pub(super) unsafe fn batch<'t, W: Walker<'t>, const ANY: bool, const FETCH: bool>(
+            pub(super) unsafe fn batch<
+                't,
+                W: Walker<'t>,
+                const ANY: bool,
+                const FETCH: bool,
+                const LATER: bool,
+            >(
                 tree: &'t Tree,
                 walker: &mut W,
                 count: usize,
@@ -52,7 +60,9 @@ macro_rules! compile {
             ) {
                 // SAFETY: the caller's word.
                 unsafe {
-                    walks::batch::<$lanes, W, ANY, FETCH>(tree, walker, count, flight, counts)
+                    walks::batch::<$lanes, W, ANY, FETCH, LATER>(
+                        tree, walker, count, flight, counts,
+                    )
                 }
             }
         }

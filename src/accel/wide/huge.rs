@@ -15,7 +15,7 @@ use std::ptr::NonNull;
 
 use rayon::prelude::*;
 
-use super::node::{Block, Node};
+use super::node::{Block, Corners, Node, Slabs};
 use crate::file::read_at;
 
 /// The size of a huge page; on machines with others this is only an alignment.
@@ -31,6 +31,11 @@ pub(super) unsafe trait Plain: Copy + Send + Sync {}
 unsafe impl Plain for Node {}
 // SAFETY: as above.
 unsafe impl Plain for Block {}
+
+// SAFETY: as above.
+unsafe impl Plain for Slabs {}
+// SAFETY: as above.
+unsafe impl Plain for Corners {}
 
 /// A fixed number of plain values.
 pub(super) struct Huge<T: Plain> {

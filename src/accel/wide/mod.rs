@@ -21,6 +21,7 @@ mod crown;
 mod curve;
 mod huge;
 mod kernel;
+mod later;
 mod node;
 mod packet;
 mod portable;
@@ -39,7 +40,7 @@ use crate::interaction::Ray;
 use crate::lanes::Kernel;
 use crate::shape::Bounds;
 use huge::Huge;
-use node::{Block, Node};
+use node::{Block, Corners, Node, Slabs};
 use state::Flight;
 
 pub(super) use state::{Best, Place, Start, Visit};
@@ -89,6 +90,26 @@ pub(super) struct Tree {
     blocks: Huge<Block>,
     /// Nodes on the longest way down.
     levels: usize,
+    /// Where everything goes, if it moves.
+    later: Option<Later>,
+}
+
+/// The end of a tree's way, which every ray meets at its own time.
+#[derive(Debug)]
+struct Later {
+    nodes: Huge<Slabs>,
+    blocks: Huge<Corners>,
+}
+
+/// What a batch may skip, since no tree asks for it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Needs {
+    /// Levels of the deepest inner tree.
+    pub(super) inner_levels: usize,
+    /// Whether memory is asked for ahead.
+    pub(super) fetch: bool,
+    /// Whether any tree moves.
+    pub(super) later: bool,
 }
 
 impl Default for Tree {
@@ -97,6 +118,7 @@ impl Default for Tree {
             nodes: Huge::of(Node::EMPTY),
             blocks: Huge::zeroed(0),
             levels: 1,
+            later: None,
         }
     }
 }
@@ -127,7 +149,7 @@ impl Tree {
         (tree, others, used)
     }
 
-    /// A box around all items.
+    /// A box around all items, at the beginning of their way.
     pub(super) fn bounds(&self) -> Bounds {
         let [low, high] = [0, 1].map(|side| [0, 2, 4].map(|axis| self.nodes[0].slabs[axis + side]));
         Bounds {
@@ -147,25 +169,28 @@ impl Tree {
 
     /// Bytes held.
     pub(super) fn bytes(&self) -> usize {
-        size_of_val(&*self.nodes) + size_of_val(&*self.blocks)
+        let later = self.later.as_ref();
+        let later = later.map(|l| size_of_val(&*l.nodes) + size_of_val(&*l.blocks));
+        size_of_val(&*self.nodes) + size_of_val(&*self.blocks) + later.unwrap_or(0)
     }
 
-    /// Walks `count` rays, all at once, through this tree, and through inner trees of at most so many levels.
-    /// `fetch` asks for memory ahead.
+    /// Walks `count` rays, all at once, through this tree and inner ones.
     pub(super) fn batch<'t, W: Walker<'t>, const ANY: bool>(
         &'t self,
         kernel: Kernel,
-        (inner_levels, fetch): (usize, bool),
+        needs: Needs,
         walker: &mut W,
         count: usize,
         counts: &mut Counts,
     ) {
-        let levels = self.levels + 1 + inner_levels;
+        let levels = self.levels + 1 + needs.inner_levels;
         let flight = &mut Flight::new(count.min(batch::IN_FLIGHT), levels);
-        if fetch {
-            compiled::batch::<W, ANY, true>(kernel, self, walker, count, flight, counts);
+        if needs.later {
+            compiled::batch::<W, ANY, true, true>(kernel, self, walker, count, flight, counts);
+        } else if needs.fetch {
+            compiled::batch::<W, ANY, true, false>(kernel, self, walker, count, flight, counts);
         } else {
-            compiled::batch::<W, ANY, false>(kernel, self, walker, count, flight, counts);
+            compiled::batch::<W, ANY, false, false>(kernel, self, walker, count, flight, counts);
         }
     }
 }

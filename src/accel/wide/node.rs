@@ -70,6 +70,18 @@ impl Node {
         }
     };
 
+    /// The node while its planes go to others; `part` is in [0, 1].
+    #[inline(always)]
+    pub(super) fn toward(&self, later: &Slabs, part: f32) -> Self {
+        let mut node = *self;
+        for (plane, later) in node.slabs.iter_mut().zip(&later.0) {
+            for (from, to) in plane.iter_mut().zip(later) {
+                *from += (*to - *from) * part;
+            }
+        }
+        node
+    }
+
     /// A node over children that are given by their boxes; they are named later.
     pub(super) fn new(boxes: &[Bounds]) -> Self {
         let mut node = Self::EMPTY;
@@ -103,6 +115,17 @@ impl Node {
         node
     }
 }
+
+/// Where the planes of a node that moves end: as [`Node::slabs`]. Lanes without a child are far away on the wrong side
+/// at both ends, for between infinities there is no number.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+pub(super) struct Slabs(pub(super) [[f32; WIDTH]; 6]);
+
+/// Where the corners of a block that moves end: as [`Block::corners`].
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(16))]
+pub(super) struct Corners(pub(super) [[[f32; BLOCK]; 3]; 3]);
 
 /// Up to four triangles. Lanes are in the order of the ids.
 #[derive(Clone, Copy, Debug)]
@@ -142,6 +165,20 @@ impl Block {
             "a tree of fewer than 2²⁸ blocks"
         );
         LEAF | (triangles as u32 - 1) << COUNT_SHIFT | index as u32
+    }
+
+    /// The block while its corners go to others; `part` is in [0, 1].
+    #[inline(always)]
+    pub(super) fn toward(&self, later: &Corners, part: f32) -> Self {
+        let mut block = *self;
+        for (axis, later) in block.corners.iter_mut().zip(&later.0) {
+            for (corner, later) in axis.iter_mut().zip(later) {
+                for (from, to) in corner.iter_mut().zip(later) {
+                    *from += (*to - *from) * part;
+                }
+            }
+        }
+        block
     }
 
     /// A triangle's corners.

@@ -7,7 +7,7 @@ use std::ptr::null;
 use glam::Vec3;
 
 use super::Tree;
-use super::node::{BOTTOM, Block, DONE, Entry, Node, WIDTH, entry};
+use super::node::{BOTTOM, Block, Corners, DONE, Entry, Node, Slabs, WIDTH, entry};
 use crate::accel::boxes::RayBoxes;
 use crate::accel::triangle::Shear;
 use crate::interaction::{Hit, Ray};
@@ -21,6 +21,8 @@ pub(in crate::accel) struct Start {
     pub(in crate::accel) instance: u32,
     /// Where the ray enters it; 0 in the world.
     pub(in crate::accel) entry: f32,
+    /// How far a tree that deforms has come on its way, in [0, 1].
+    pub(in crate::accel) part: f32,
     /// What is known already.
     pub(in crate::accel) best: Best,
 }
@@ -75,7 +77,7 @@ impl Place {
 
 /// A ray on its way. The first cache line is what a node needs, the second what a block needs.
 ///
-/// `nodes` and `blocks` are those of the tree that the ray is in, and live as long as the walk.
+/// `nodes` and `blocks`, and where they go, are those of the tree that the ray is in, and live as long as the walk.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(super) struct State {
@@ -110,6 +112,12 @@ pub(super) struct State {
     pub(super) instance: u32,
     /// The ray's place in its batch.
     pub(super) ray: u32,
+    /// As in [`Start`].
+    pub(super) part: f32,
+    /// Where nodes go; null where they stand.
+    pub(super) later_nodes: *const Slabs,
+    /// Where blocks go; null where they stand.
+    pub(super) later_blocks: *const Corners,
 }
 
 /// A node's slabs of one axis, and a block's corners of one axis, in bytes.
@@ -151,6 +159,9 @@ impl State {
         entry: 0.0,
         instance: Hit::NONE,
         ray: 0,
+        part: 0.0,
+        later_nodes: null(),
+        later_blocks: null(),
     };
 
     /// Begins with a ray; `bottom` is its stack's. What remains is to enter a tree.
@@ -172,6 +183,11 @@ impl State {
         self.id = start.best.id;
         self.entry = start.entry;
         self.instance = start.instance;
+        self.part = start.part;
+        (self.later_nodes, self.later_blocks) = match &tree.later {
+            Some(later) => (later.nodes.as_ptr(), later.blocks.as_ptr()),
+            None => (null(), null()),
+        };
     }
 
     /// Keeps a ray that is not finite from meeting anything: its comparisons would go any way.

@@ -38,6 +38,7 @@ fn ray<L: Lanes>(i: u32) -> State {
         },
         instance: 0,
         entry: number(3, i).max(0.0),
+        part: 0.0,
         best: Best {
             t: 1.0 + number(4, i),
             id: u32::MAX,

@@ -91,6 +91,23 @@ impl<F: Lanes> Triangles<F> {
         self.barycentric[1][lane] = barycentric.y;
     }
 
+    /// Puts a corner of a lane's triangle elsewhere, with its normal if it has one.
+    pub(in crate::shape) fn place(
+        &mut self,
+        lane: usize,
+        corner: usize,
+        position: glam::Vec3,
+        normal: Option<glam::Vec3>,
+    ) {
+        for (row, value) in self.positions[corner].iter_mut().zip(position.to_array()) {
+            row[lane] = value;
+        }
+        let Some(normal) = normal else { return };
+        for (row, value) in self.normals[corner].iter_mut().zip(normal.to_array()) {
+            row[lane] = value;
+        }
+    }
+
     /// The points.
     #[inline(always)]
     pub fn surface(&self) -> TrianglePoints<F> {

@@ -1,0 +1,594 @@
+//! Transforms that change over time. A keyframe is taken apart into scale, rotation and translation, M = T·R·S; between
+//! two keyframes scale and translation go straight, and the rotation takes the shorter arc at constant speed (Shoemake,
+//! *Animating rotation with quaternion curves*, 1985). Before the first and after the last keyframe these hold. Where
+//! what moves stands in what moves, the product of all is taken at one time.
+
+use std::f64::consts::PI;
+use std::fmt;
+use std::sync::Arc;
+
+use glam::{DAffine3, DMat3, DMat4, DQuat, DVec3, Vec3};
+
+use super::Transform;
+
+/// A transform at every time.
+#[derive(Clone, Debug)]
+pub enum Moving {
+    /// The same at all times.
+    Still(Transform),
+    /// Keyframes, or a product of such and of others that stand still.
+    Keyed(Arc<Chain>),
+}
+
+/// A product of transforms, of which one moves at least.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Chain {
+    /// The outermost first.
+    links: Vec<Link>,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+enum Link {
+    Fixed {
+        forward: DAffine3,
+        inverse: DAffine3,
+    },
+    Track(Track),
+}
+
+/// Keyframes in time.
+#[derive(Clone, Debug, PartialEq)]
+struct Track {
+    /// Strictly increasing; two at least.
+    times: Vec<f64>,
+    poses: Vec<Pose>,
+    /// From each pose to the next.
+    arcs: Vec<Turn>,
+}
+
+/// A transform that neither shears nor flattens, in parts: x ↦ rotation·(scale·x) + translation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pose {
+    /// No component is 0; all are negative where it mirrors, else positive.
+    scale: DVec3,
+    rotation: DQuat,
+    translation: DVec3,
+}
+
+/// The shorter arc from one rotation q to another: q·cos(s·angle) + `side`·sin(s·angle) for s in [0, 1].
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Turn {
+    /// At right angles to q, of unit length, as vectors of four.
+    side: DQuat,
+    /// Between the quaternions in radians, which is half of that by which space turns; in [0, π/2].
+    angle: f64,
+}
+
+/// Why keyframes make no motion. Keyframes are counted from 0.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Unmovable {
+    /// There is none.
+    Nothing,
+    /// The time is no number, does not follow the one before, or is too far from it.
+    Time(usize),
+    /// The transform is not affine, not finite or singular.
+    Flat(usize),
+    /// The transform shears, so that it is no product of scale, rotation and translation.
+    Sheared(usize),
+    /// It mirrors and the one before does not, or the other way round: between them space would be flat.
+    Mirrored(usize),
+}
+
+impl fmt::Display for Unmovable {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Nothing => "there is no keyframe",
+            Self::Time(_) => "the times of keyframes must be finite and follow each other",
+            Self::Flat(_) => "the transform of a keyframe must be affine and invertible",
+            Self::Sheared(_) => "the transform of a keyframe cannot shear",
+            Self::Mirrored(_) => "of two keyframes one mirrors and the other does not",
+        })
+    }
+}
+
+/// The largest cosine between two images of axes that are taken to be at right angles: matrices in files are rounded.
+const SHEAR: f64 = 1e-3;
+/// The cosine between quaternions below which their rotations are half a turn apart, as far as can be told.
+const HALF_TURN: f64 = 1e-7;
+/// Space turns by no more than that between two boxes whose union bounds a motion, in radians.
+const STEP: f64 = PI / 16.0;
+/// The part of coordinates that rounding to single precision may change them by.
+const ROUNDING: f64 = 8.0 * f32::EPSILON as f64;
+
+impl Pose {
+    /// Takes a matrix apart.
+    ///
+    /// # Errors
+    /// [`Unmovable::Flat`] or [`Unmovable::Sheared`], with number 0.
+    pub fn new(matrix: &DMat4) -> Result<Self, Unmovable> {
+        Transform::new(matrix).ok_or(Unmovable::Flat(0))?;
+        let m = DAffine3::from_mat4(*matrix);
+        let linear = m.matrix3;
+        let lengths = DVec3::new(
+            linear.x_axis.length(),
+            linear.y_axis.length(),
+            linear.z_axis.length(),
+        );
+        let sign = linear.determinant().signum();
+        let scale = lengths * sign;
+        let [x, y, z] = [0, 1, 2].map(|i| linear.col(i) / scale[i]);
+        let cosines = [x.dot(y), y.dot(z), z.dot(x)];
+        if cosines.iter().any(|c| c.abs() > SHEAR) {
+            return Err(Unmovable::Sheared(0));
+        }
+        let y = (y - x * x.dot(y)).normalize();
+        let rotation = DQuat::from_mat3(&DMat3::from_cols(x, y, x.cross(y))).normalize();
+        Ok(Self {
+            scale,
+            rotation,
+            translation: m.translation,
+        })
+    }
+
+    /// Whether it turns right hands into left ones.
+    pub fn mirrors(&self) -> bool {
+        self.scale.x < 0.0
+    }
+
+    /// Whether the other is half a turn away, so that neither arc to it is the shorter one.
+    pub fn is_half_a_turn_from(&self, other: &Self) -> bool {
+        self.rotation.dot(other.rotation).abs() < HALF_TURN
+    }
+
+    fn forward(&self) -> DAffine3 {
+        DAffine3::from_scale_rotation_translation(self.scale, self.rotation, self.translation)
+    }
+
+    /// The way back, without inverting a matrix.
+    fn inverse(&self) -> DAffine3 {
+        let turned = DMat3::from_quat(self.rotation).transpose();
+        let r = self.scale.recip();
+        let matrix3 = DMat3::from_cols(turned.x_axis * r, turned.y_axis * r, turned.z_axis * r);
+        DAffine3 {
+            matrix3,
+            translation: -(matrix3 * self.translation),
+        }
+    }
+}
+
+impl Turn {
+    fn between(from: DQuat, to: DQuat) -> Self {
+        let cosine = from.dot(to);
+        let (to, cosine) = if cosine < 0.0 {
+            (-to, -cosine)
+        } else {
+            (to, cosine)
+        };
+        let side = to - from * cosine;
+        let sine = side.length();
+        if sine < f64::EPSILON {
+            return Self {
+                side: DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0),
+                angle: 0.0,
+            };
+        }
+        Self {
+            side: side / sine,
+            angle: sine.atan2(cosine),
+        }
+    }
+}
+
+impl Track {
+    fn new(keyframes: &[(f64, DMat4)]) -> Result<Self, Unmovable> {
+        let mut times: Vec<f64> = Vec::with_capacity(keyframes.len());
+        let mut poses: Vec<Pose> = Vec::with_capacity(keyframes.len());
+        for (number, (time, matrix)) in keyframes.iter().enumerate() {
+            let pose = Pose::new(matrix).map_err(|why| match why {
+                Unmovable::Sheared(_) => Unmovable::Sheared(number),
+                _ => Unmovable::Flat(number),
+            })?;
+            let step = times.last().map_or(1.0, |last| time - last);
+            if !(time.is_finite() && step.is_finite() && step > 0.0) {
+                return Err(Unmovable::Time(number));
+            }
+            if poses
+                .last()
+                .is_some_and(|last| last.mirrors() != pose.mirrors())
+            {
+                return Err(Unmovable::Mirrored(number));
+            }
+            times.push(*time);
+            poses.push(pose);
+        }
+        let arcs = poses
+            .windows(2)
+            .map(|p| Turn::between(p[0].rotation, p[1].rotation));
+        Ok(Self {
+            arcs: arcs.collect(),
+            times,
+            poses,
+        })
+    }
+
+    /// The keyframe before `time`, and the part of the way to the next, in [0, 1].
+    #[inline]
+    fn place(&self, time: f64) -> (usize, f64) {
+        let last = self.times.len() - 1;
+        let after = self.times.partition_point(|t| *t <= time);
+        match after {
+            0 => (0, 0.0),
+            _ if after > last => (last - 1, 1.0),
+            _ => {
+                let [from, to] = [self.times[after - 1], self.times[after]];
+                (after - 1, (time - from) / (to - from))
+            }
+        }
+    }
+
+    #[inline]
+    fn pose(&self, (key, s): (usize, f64)) -> Pose {
+        let [from, to] = [&self.poses[key], &self.poses[key + 1]];
+        let Turn { side, angle } = self.arcs[key];
+        let (sin, cos) = (s * angle).sin_cos();
+        Pose {
+            scale: from.scale + (to.scale - from.scale) * s,
+            rotation: from.rotation * cos + side * sin,
+            translation: from.translation + (to.translation - from.translation) * s,
+        }
+    }
+
+    /// A box around a box's image at all times of an interval. Between two times that are a part h of an arc apart, a
+    /// point strays from the straight line by at most h²/8·max|p″|, and p″ = R″Sx + 2R′S′x.
+    fn swept(&self, [min, max]: [DVec3; 2], (open, close): (f64, f64)) -> [DVec3; 2] {
+        let farthest = min.abs().max(max.abs());
+        let [first, last] = [open, close].map(|time| self.place(time));
+        let mut swept = image(&self.pose(first).forward(), [min, max]);
+        for key in first.0..=last.0 {
+            let from = if key == first.0 { first.1 } else { 0.0 };
+            let to = if key == last.0 { last.1 } else { 1.0 };
+            let speed = 2.0 * self.arcs[key].angle;
+            let steps = (speed * (to - from) / STEP).ceil().max(1.0);
+            let h = (to - from) / steps;
+            let [a, b] = [&self.poses[key], &self.poses[key + 1]];
+            let reach = (a.scale.abs().max(b.scale.abs()) * farthest).length();
+            let growth = ((b.scale - a.scale).abs() * farthest).length();
+            let bulge = h * h / 8.0 * (speed * speed * reach + 2.0 * speed * growth);
+            for step in 0..=steps as u32 {
+                let s = (from + h * f64::from(step)).min(1.0);
+                let [low, high] = image(&self.pose((key, s)).forward(), [min, max]);
+                swept = [swept[0].min(low - bulge), swept[1].max(high + bulge)];
+            }
+        }
+        swept
+    }
+}
+
+/// A box around a box's image.
+fn image(transform: &DAffine3, [min, max]: [DVec3; 2]) -> [DVec3; 2] {
+    let m = transform.matrix3;
+    let (mut low, mut high) = (transform.translation, transform.translation);
+    for axis in 0..3 {
+        let (a, b) = (m.col(axis) * min[axis], m.col(axis) * max[axis]);
+        low += a.min(b);
+        high += a.max(b);
+    }
+    [low, high]
+}
+
+impl Chain {
+    /// At `time`.
+    pub fn at(&self, time: f32) -> Transform {
+        let time = f64::from(time);
+        let mut links = self.links.iter().map(|link| match link {
+            Link::Fixed { forward, inverse } => (*forward, *inverse),
+            Link::Track(track) => {
+                let pose = track.pose(track.place(time));
+                (pose.forward(), pose.inverse())
+            }
+        });
+        let outermost = links
+            .next()
+            .unwrap_or((DAffine3::IDENTITY, DAffine3::IDENTITY));
+        let (forward, inverse) = links.fold(outermost, |(forward, inverse), inner| {
+            (forward * inner.0, inner.1 * inverse)
+        });
+        Transform::of_parts(&forward, &inverse)
+    }
+}
+
+impl Moving {
+    /// Moves nothing.
+    pub const IDENTITY: Self = Self::Still(Transform::IDENTITY);
+
+    /// From keyframes: (time, transform).
+    ///
+    /// # Errors
+    /// Where they make no motion.
+    pub fn new(keyframes: &[(f64, DMat4)]) -> Result<Self, Unmovable> {
+        let (_, first) = keyframes.first().ok_or(Unmovable::Nothing)?;
+        let track = Track::new(keyframes)?;
+        if keyframes.iter().all(|(_, matrix)| matrix == first) {
+            let still = Transform::new(first).ok_or(Unmovable::Flat(0))?;
+            return Ok(Self::Still(still));
+        }
+        let links = vec![Link::Track(track)];
+        Ok(Self::Keyed(Arc::new(Chain { links })))
+    }
+
+    /// The product of `outer`, `between` and `inner`, of which the first and the last may be absent; `None` where
+    /// `between` is not affine and invertible.
+    pub fn product(outer: Option<&Self>, between: &DMat4, inner: Option<&Self>) -> Option<Self> {
+        let still = Transform::new(between)?;
+        let fixed = |matrix: DAffine3| Link::Fixed {
+            forward: matrix,
+            inverse: matrix.inverse(),
+        };
+        let links_of = |moving: &Self| match moving {
+            Self::Still(transform) => vec![fixed(transform.forward())],
+            Self::Keyed(chain) => chain.links.clone(),
+        };
+        let mut links: Vec<Link> = outer.map(links_of).unwrap_or_default();
+        if *between != DMat4::IDENTITY {
+            links.push(fixed(DAffine3::from_mat4(*between)));
+        }
+        links.extend(inner.map(links_of).unwrap_or_default());
+        if links.iter().any(|link| matches!(link, Link::Track(_))) {
+            return Some(Self::Keyed(Arc::new(Chain { links })));
+        }
+        if outer.is_none() && inner.is_none() {
+            return Some(Self::Still(still));
+        }
+        let chain = Chain { links };
+        Some(Self::Still(chain.at(0.0)))
+    }
+
+    /// Whether it is the same at all times.
+    pub fn is_still(&self) -> bool {
+        matches!(self, Self::Still(_))
+    }
+
+    /// At `time`, in the units of `shutter_open`.
+    #[inline]
+    pub fn at(&self, time: f32) -> Transform {
+        match self {
+            Self::Still(transform) => *transform,
+            Self::Keyed(chain) => chain.at(time),
+        }
+    }
+
+    /// The times of its keyframes; at one of them any is as good as another where it is still.
+    pub fn times(&self) -> Vec<f32> {
+        let mut times = vec![];
+        if let Self::Keyed(chain) = self {
+            for link in &chain.links {
+                if let Link::Track(track) = link {
+                    times.extend(track.times.iter().map(|time| *time as f32));
+                }
+            }
+        }
+        if times.is_empty() {
+            times.push(0.0);
+        }
+        times.sort_by(f32::total_cmp);
+        times.dedup();
+        times
+    }
+
+    /// A box (smallest and largest coordinates) around the images of a finite box at all times from `open` to `close`,
+    /// with room for rounding.
+    pub fn swept(&self, bounds: [Vec3; 2], (open, close): (f32, f32)) -> [Vec3; 2] {
+        let interval = (f64::from(open), f64::from(close));
+        let mut bounds = bounds.map(|corner| corner.as_dvec3());
+        let mut room = DVec3::ZERO;
+        let add_rounding = |room: DVec3, forward: &DAffine3, bounds: [DVec3; 2]| {
+            let m = forward.matrix3;
+            let spread = DMat3::from_cols(m.x_axis.abs(), m.y_axis.abs(), m.z_axis.abs());
+            let farthest = bounds[0].abs().max(bounds[1].abs());
+            spread * (room + ROUNDING * farthest) + ROUNDING * forward.translation.abs()
+        };
+        match self {
+            Self::Still(transform) => {
+                let forward = transform.forward();
+                room = add_rounding(room, &forward, bounds);
+                bounds = image(&forward, bounds);
+            }
+            Self::Keyed(chain) => {
+                for link in chain.links.iter().rev() {
+                    bounds = match link {
+                        Link::Fixed { forward, .. } => {
+                            room = add_rounding(room, forward, bounds);
+                            image(forward, bounds)
+                        }
+                        Link::Track(track) => {
+                            let largest = |of: fn(&Pose) -> DVec3| {
+                                track.poses.iter().map(of).fold(DVec3::ZERO, DVec3::max)
+                            };
+                            let scale = largest(|pose| pose.scale.abs()).max_element();
+                            let spread = DVec3::splat(scale * 3.0_f64.sqrt());
+                            let farthest = bounds[0].abs().max(bounds[1].abs());
+                            let turned = (room + ROUNDING * farthest).length();
+                            let moved = largest(|pose| pose.translation.abs());
+                            room = spread * turned + ROUNDING * moved;
+                            track.swept(bounds, interval)
+                        }
+                    };
+                }
+            }
+        }
+        [(bounds[0] - room).as_vec3(), (bounds[1] + room).as_vec3()]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::random;
+
+    fn number(key: u64, i: u32) -> f64 {
+        f64::from(random::unit(random::bits(key, i)))
+    }
+
+    fn vector(key: u64, i: u32) -> DVec3 {
+        let c = |j| 2.0 * number(key, 3 * i + j) - 1.0;
+        DVec3::new(c(0), c(1), c(2))
+    }
+
+    /// A pose of any kind.
+    fn matrix(key: u64, i: u32) -> DMat4 {
+        DMat4::from_translation(3.0 * vector(key, 4 * i))
+            * DMat4::from_axis_angle(vector(key, 4 * i + 1).normalize(), 9.0 * number(key, 7 * i))
+            * DMat4::from_scale(vector(key, 4 * i + 2).abs() + 0.2)
+    }
+
+    /// Motions of one track and of several, with uneven keyframes.
+    fn motions() -> Vec<Moving> {
+        let one = |key| {
+            let keyframes =
+                (0..4).map(|i| (f64::from(i) + 0.5 * number(key, 90 + i), matrix(key, i)));
+            Moving::new(&keyframes.collect::<Vec<_>>()).unwrap()
+        };
+        let mut motions: Vec<Moving> = (1..12).map(one).collect();
+        let mirrored = [(0.0, 1.0), (1.0, 3.0)].map(|(time, size)| {
+            let mirror = DMat4::from_scale(DVec3::new(size, -0.5, 2.0));
+            (time, DMat4::from_rotation_y(2.5 * time) * mirror)
+        });
+        motions.push(Moving::new(&mirrored).unwrap());
+        let shear = DMat4::from_mat3(DMat3::from_cols(
+            DVec3::X,
+            DVec3::new(1.0, 1.0, 0.0),
+            DVec3::Z,
+        ));
+        motions.push(Moving::product(Some(&one(20)), &shear, Some(&one(21))).unwrap());
+        motions.push(Moving::product(None, &shear, Some(&one(22))).unwrap());
+        motions
+    }
+
+    #[test]
+    fn keyframes_are_met_and_the_ends_hold() {
+        for key in 1..20 {
+            let keyframes: Vec<(f64, DMat4)> = [0.0, 0.25, 2.0]
+                .into_iter()
+                .zip((0..).map(|i| matrix(key, i)))
+                .collect();
+            let moving = Moving::new(&keyframes).unwrap();
+            for (time, at) in [(-5.0, 0), (0.0, 0), (0.25, 1), (2.0, 2), (9.0, 2)] {
+                let expected = Transform::new(&keyframes[at].1).unwrap();
+                let found = moving.at(time);
+                for (a, b) in [(expected, found), (expected.inverse(), found.inverse())] {
+                    let size = a
+                        .linear()
+                        .to_cols_array()
+                        .into_iter()
+                        .fold(1.0, |m: f32, c| m.max(c.abs()));
+                    assert!(
+                        a.linear().abs_diff_eq(b.linear(), 1e-5 * size),
+                        "{a:?} {b:?}"
+                    );
+                    assert!(a.translation().abs_diff_eq(b.translation(), 2e-5 * size));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_way_there_and_back_is_the_identity_at_every_time() {
+        for moving in motions() {
+            for i in 0..50 {
+                let at = moving.at((5.0 * number(40, i)) as f32);
+                let p = vector(41, i).as_vec3();
+                assert!(at.inverse().point(at.point(p)).distance(p) < 2e-4);
+            }
+        }
+    }
+
+    #[test]
+    fn rotations_keep_their_speed_and_take_the_shorter_way() {
+        let turned = |degrees: f64| DMat4::from_rotation_z(degrees.to_radians());
+        for (to, middle) in [(90.0, 45.0), (170.0, 85.0), (-120.0, -60.0), (270.0, -45.0)] {
+            let moving = Moving::new(&[(0.0, turned(0.0)), (1.0, turned(to))]).unwrap();
+            let found = moving.at(0.5).point(Vec3::X);
+            let expected = turned(middle).transform_point3(DVec3::X).as_vec3();
+            assert!(found.distance(expected) < 1e-6, "{to}: {found}");
+        }
+    }
+
+    #[test]
+    fn what_stands_in_what_moves_goes_on_an_arc() {
+        let half = |angle: f64| DMat4::from_rotation_z(angle);
+        let outer = Moving::new(&[(0.0, half(0.0)), (1.0, half(1.0))]).unwrap();
+        let inner = Moving::new(&[(0.0, half(0.0)), (1.0, half(-1.0))]).unwrap();
+        let out = DMat4::from_translation(DVec3::new(2.0, 0.0, 0.0));
+        let product = Moving::product(Some(&outer), &out, Some(&inner)).unwrap();
+        for time in [0.0_f32, 0.3, 0.5, 1.0] {
+            let expected = Vec3::new(2.0 * time.cos() + 1.0, 2.0 * time.sin(), 0.0);
+            let found = product.at(time).point(Vec3::X);
+            assert!(found.distance(expected) < 1e-6, "{time}: {found}");
+        }
+    }
+
+    #[test]
+    fn the_swept_box_holds_the_box_at_all_times_and_little_more() {
+        for (i, moving) in (0..).zip(motions()) {
+            let (a, b) = (vector(50, i), vector(51, i));
+            let bounds = [a.min(b).as_vec3(), a.max(b).as_vec3()];
+            let open = (4.0 * number(52, i)) as f32;
+            for interval in [
+                (open, open),
+                (open, open + 0.3),
+                (open, open + 9.0),
+                (-1.0, 5.0),
+            ] {
+                let [min, max] = moving.swept(bounds, interval);
+                let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+                for step in 0..=2000 {
+                    let s = step as f32 / 2000.0;
+                    let at = moving.at(interval.0 + s * (interval.1 - interval.0));
+                    for corner in 0..8 {
+                        let pick = |axis: usize| bounds[corner >> axis & 1][axis];
+                        let p = at.point(Vec3::new(pick(0), pick(1), pick(2)));
+                        (low, high) = (low.min(p), high.max(p));
+                    }
+                }
+                assert!(
+                    min.cmple(low).all() && max.cmpge(high).all(),
+                    "{i} {interval:?}"
+                );
+                let slack = ((low - min).max(max - high)).max_element();
+                // Of nested motions the box of a box is bounded.
+                let most = if i < 12 { 0.02 } else { 2.0 } * (high - low).length();
+                assert!(slack < most, "{i} {interval:?}: {slack} {most}");
+            }
+        }
+    }
+
+    #[test]
+    fn keyframes_that_make_no_motion_are_told_with_their_number() {
+        let id = DMat4::IDENTITY;
+        let flat = DMat4::from_scale(DVec3::new(1.0, 1.0, 0.0));
+        let mirror = DMat4::from_scale(DVec3::new(1.0, 1.0, -1.0));
+        let shear = DMat4::from_mat3(DMat3::from_cols(
+            DVec3::X,
+            DVec3::new(0.1, 1.0, 0.0),
+            DVec3::Z,
+        ));
+        let why = |keyframes: &[(f64, DMat4)]| Moving::new(keyframes).unwrap_err();
+        assert_eq!(why(&[]), Unmovable::Nothing);
+        assert_eq!(why(&[(0.0, id), (0.0, id)]), Unmovable::Time(1));
+        assert_eq!(why(&[(0.0, id), (-1.0, id)]), Unmovable::Time(1));
+        assert_eq!(why(&[(f64::NAN, id)]), Unmovable::Time(0));
+        assert_eq!(why(&[(-1e308, id), (1e308, id)]), Unmovable::Time(1));
+        assert_eq!(why(&[(0.0, id), (1.0, flat)]), Unmovable::Flat(1));
+        assert_eq!(why(&[(0.0, id), (1.0, shear)]), Unmovable::Sheared(1));
+        assert_eq!(
+            why(&[(0.0, id), (1.0, id), (2.0, mirror)]),
+            Unmovable::Mirrored(2)
+        );
+        assert!(Moving::new(&[(7.0, mirror)]).unwrap().is_still());
+        assert!(
+            Moving::new(&[(0.0, mirror), (1.0, mirror)])
+                .unwrap()
+                .is_still()
+        );
+    }
+}
