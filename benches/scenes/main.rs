@@ -17,6 +17,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, ExitCode, Stdio};
 
 use clap::Parser;
+use etendue::budget::Budget;
 use etendue::crosscheck::find_python;
 use etendue::description::{self, Description};
 use etendue::render::{Options, Overrides, Session, Silent};
@@ -163,7 +164,7 @@ struct Ours {
 
 impl Ours {
     fn load(path: &Path, size: (u32, u32), spp: u32) -> Result<Self, String> {
-        let read = Description::read(path, &description::Options::default());
+        let read = Description::read(path, &description::Options::default(), &Budget::default());
         let mut description = read.map_err(|e| e.to_string())?;
         let overrides = Overrides {
             spp: Some(spp),

@@ -65,7 +65,8 @@ impl<C: ColorModel> Envmap<C> {
         let path = properties.file("filename")?;
         let scale = properties.float("scale")?;
         let to_world = rotation(properties)?;
-        let picture = Picture::read(&path, false).map_err(|e| e.at(properties.location()))?;
+        let picture = Picture::read(&path, false, properties.budget())
+            .map_err(|e| e.at(properties.location()))?;
         let [width, height] = size(&picture);
         let color = &context.palettes.colors.color;
         let weights = weights(&picture);

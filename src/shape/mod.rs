@@ -342,6 +342,9 @@ const TO_WORLD: Row = transform("to_world", "from the shape's space to the world
 const FLIP_NORMALS: Row = boolean("flip_normals", false, "whether the other side is the front");
 const BSDF: Row = nested(Kind::Bsdf, "how it scatters light; diffuse without one");
 
+/// How far a surface may be moved; squares of single precision end at 3.4e38.
+const MOST_DISPLACED: f64 = 1e15;
+
 /// What every shape reads.
 const COMMON: &[Row] = &[
     TO_WORLD,
@@ -366,12 +369,14 @@ const COMMON: &[Row] = &[
         1.0,
         "what displacement is multiplied by",
     )
+    .between(-MOST_DISPLACED, MOST_DISPLACED)
     .own(),
     float(
         "displacement_offset",
         0.0,
         "what is added to that; scene units",
     )
+    .between(-MOST_DISPLACED, MOST_DISPLACED)
     .own(),
     float(
         "displacement_edge",
@@ -479,7 +484,7 @@ pub fn build_within(setting: &Setting<'_>, properties: &Properties<'_>) -> Resul
         Some(Build::Made(build)) => build(properties, &setting.outer),
         Some(Build::Read(options)) => {
             let file = mesh::file(properties, options(properties)?)?;
-            let loaded = read(&file.path, &file.options);
+            let loaded = read(&file.path, &file.options, properties.budget());
             let loaded = loaded.map_err(|e| e.named_at(properties.location()))?;
             mesh::place_file(loaded, properties, setting)
         }

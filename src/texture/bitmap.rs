@@ -7,6 +7,7 @@ use std::sync::Arc;
 use glam::{Mat3, Vec2};
 
 use super::{Palette, Pattern, Picture, to_uv, transformed};
+use crate::budget::Budget;
 use crate::color::{ColorModel, Role, Spectral};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, boolean, choice, file, string};
@@ -113,7 +114,8 @@ impl<C: ColorModel> Bitmap<C> {
         let texels = match cached {
             Some(texels) => texels,
             None => {
-                let loaded = load(&key.0, palette, raw).map_err(|e| e.at(properties.location()))?;
+                let loaded = load(&key.0, palette, raw, properties.budget())
+                    .map_err(|e| e.at(properties.location()))?;
                 let Loaded { texels, clamped } = loaded;
                 if clamped > 0 {
                     let all = texels.texels.len();
@@ -190,8 +192,9 @@ fn load<C: ColorModel>(
     path: &std::path::Path,
     palette: &Palette<C>,
     raw: bool,
+    budget: &Budget,
 ) -> Result<Loaded<C>> {
-    let picture = Picture::read(path, raw)?;
+    let picture = Picture::read(path, raw, budget)?;
     let [width, height] = picture.size();
     let role = if raw && palette.role == Role::Reflectance {
         Role::Quantity
@@ -204,7 +207,9 @@ fn load<C: ColorModel>(
         clamped += usize::from(!fits);
         palette.color.texel(rgb, role)
     };
-    let texels = picture.texels().map(texel).collect();
+    let texels = picture.into_texels(size_of::<C::Texel>(), |picture| {
+        picture.texels().map(texel).collect()
+    })?;
     Ok(Loaded {
         texels: Texels {
             width,

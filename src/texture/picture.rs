@@ -3,9 +3,10 @@
 
 use std::path::Path;
 
+use crate::budget::{Account, Budget};
 use crate::color::srgb;
 use crate::error::{Error, Location, Result};
-use crate::image::{self, Encoding, Image, Limits};
+use crate::image::{self, Encoding, Image};
 
 /// The colours of an image file.
 #[derive(Debug)]
@@ -14,15 +15,17 @@ pub struct Picture {
     /// Where red, green and blue stand among the channels.
     rgb: [usize; 3],
     encoded: bool,
+    account: Account,
 }
 
 impl Picture {
     /// Reads the file; `raw` says that it holds plain numbers.
     ///
     /// # Errors
-    /// Where the file cannot be read or holds no colours.
-    pub fn read(path: &Path, raw: bool) -> Result<Self> {
-        let picture = image::read(path, &Limits::default())?;
+    /// Where the file cannot be read, holds no colours or is larger than the budget allows.
+    pub fn read(path: &Path, raw: bool, budget: &Budget) -> Result<Self> {
+        let account = budget.open();
+        let picture = image::read(path, &account)?;
         let image = picture.image.into_rgb();
         let Some(rgb) = image.rgb() else {
             let message = format!("no colour channels among {:?}", image.channels());
@@ -32,12 +35,26 @@ impl Picture {
             image,
             rgb,
             encoded: picture.encoding != Encoding::Linear && !raw,
+            account,
         })
     }
 
     /// Columns and rows.
     pub fn size(&self) -> [usize; 2] {
         [self.image.width() as usize, self.image.height() as usize]
+    }
+
+    /// What is made of its texels: `size` bytes of each, which are taken before it is made and kept in place of the
+    /// picture.
+    ///
+    /// # Errors
+    /// Where the budget does not allow it.
+    pub fn into_texels<T>(self, size: usize, make: impl FnOnce(&Self) -> T) -> Result<T> {
+        let [width, height] = self.size();
+        self.account.take_rows(width * height, size)?;
+        let made = make(&self);
+        self.account.keep((width * height * size) as u64);
+        Ok(made)
     }
 
     /// All texels, row by row from the top.
