@@ -253,8 +253,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         } else {
             match series.item(item) {
                 Ok(ending) => ending,
-                // It was stopped while it was read.
-                Err(_) if series.stop.signalled() => Ending::NotBegun,
+                Err(_) if series.stop.signalled() => {
+                    let message = format!("{}: stopped while it was read", item.name());
+                    series.warn(&Error::input(message));
+                    Ending::NotBegun
+                }
                 Err(error) => {
                     report::error(&error);
                     Ending::Failed(error)

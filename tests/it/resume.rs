@@ -377,14 +377,17 @@ fn on_a_full_disk_nothing_is_left_but_what_was_there() {
     let before = there();
     for arguments in [
         "render scene.xml -o a.exr --spp 16 --checkpoint 0.001",
-        "render scene.xml -o a.exr --spp 1 --checkpoint 0.001 --noise-threshold 0.1 --max-spp 16",
+        "render scene.xml -o a.exr --checkpoint 0.001 --noise-threshold 0.1 --max-spp 16",
         "mesh generate terrain hills.ply --triangles 1k",
         "profile scene.xml --quick --sweep samples --rounds 1 -o .",
     ] {
         let program = env!("CARGO_BIN_EXE_etendue");
         let output = Command::new("sh")
             .current_dir(place.0.path())
-            .args(["-c", &format!("trap '' XFSZ; ulimit -f 1; exec {program} {arguments}")])
+            .args([
+                "-c",
+                &format!("trap '' XFSZ; ulimit -f 1; exec {program} {arguments}"),
+            ])
             .output()
             .unwrap();
         let said = String::from_utf8_lossy(&output.stderr);
