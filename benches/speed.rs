@@ -10,6 +10,7 @@ use std::sync::{Arc, OnceLock};
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use etendue::accel::{Counts, Method, Order, Tracer};
+use etendue::budget::Budget;
 use etendue::description::{self, Description, Kind};
 use etendue::interaction::{Hit, Ray};
 use etendue::lanes::warp;
@@ -182,7 +183,8 @@ fn cornell_box_in_bands(bencher: Bencher<'_, '_>, bands: usize) {
 fn render_small(bencher: Bencher<'_, '_>, name: &str, colors: Colors) {
     let path = format!("{}/scenes/{name}.xml", env!("CARGO_MANIFEST_DIR"));
     let options = description::Options::default();
-    let mut description = Description::read(path.as_ref(), &options).expect("the scene is right");
+    let mut description =
+        Description::read(path.as_ref(), &options, &Budget::default()).expect("the scene is right");
     let (spp, size) = (4, (128, 96));
     Overrides {
         spp: Some(spp),

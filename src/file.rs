@@ -12,8 +12,11 @@ use tempfile::NamedTempFile;
 
 use crate::error::{Error, Result};
 
-/// Writes `bytes` as the file `path`.
-pub(crate) fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
+/// Writes `bytes` as the file `path`, which is there whole or not at all.
+///
+/// # Errors
+/// Where the file must not be replaced, or the file system refuses.
+pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
     stream_atomically(path, |file| file.write_all(bytes))
 }
 

@@ -4,6 +4,7 @@
 
 pub mod error;
 
+pub mod budget;
 pub mod file;
 pub mod math;
 

@@ -4,6 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use clap::ValueEnum;
+use etendue::budget::Budget;
 use etendue::mesh::{self, Mesh, ReadOptions};
 use etendue::shape::{Geometry, TriangleMesh};
 use glam::Vec3;
@@ -74,7 +75,8 @@ fn read(file: &str) -> Result<Option<Mesh>, String> {
     if !path.exists() {
         return Ok(None);
     }
-    let loaded = mesh::read(&path, &ReadOptions::default()).map_err(|e| e.to_string())?;
+    let loaded = mesh::read(&path, &ReadOptions::default(), &Budget::default())
+        .map_err(|e| e.to_string())?;
     Ok(Some(loaded.mesh))
 }
 

@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use etendue::image::{self, Image, Limits};
+use etendue::budget::Account;
+use etendue::image::{self, Image};
 
 use super::{Arguments, Ours, Theirs, median};
 
@@ -34,7 +35,7 @@ impl Renderer {
             }
             Self::Theirs(theirs) => {
                 let seconds = theirs.render(seed, Some(file))?;
-                let read = image::read(file, &Limits::default()).map_err(|e| e.to_string())?;
+                let read = image::read(file, &Account::default()).map_err(|e| e.to_string())?;
                 Ok((seconds, colors(read.image)?))
             }
         }
@@ -71,7 +72,7 @@ pub(super) fn compare(
     let mut converged = Theirs::load(arguments, VARIANT, path, (size, reference), None)?;
     converged.render(1, Some(&file))?;
     drop(converged);
-    let read = image::read(&file, &Limits::default()).map_err(|e| e.to_string())?;
+    let read = image::read(&file, &Account::default()).map_err(|e| e.to_string())?;
     let reference = colors(read.image)?;
     let spp = arguments.spp;
     let [best, their_best] = BEST;

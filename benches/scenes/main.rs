@@ -23,6 +23,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, ExitCode, Stdio};
 
 use clap::Parser;
+use etendue::budget::Budget;
 use etendue::crosscheck::find_python;
 use etendue::description::{self, Description};
 use etendue::image::Image;
@@ -184,7 +185,7 @@ impl Ours {
         spp: u32,
         sampler: Option<&str>,
     ) -> Result<Self, String> {
-        let read = Description::read(path, &description::Options::default());
+        let read = Description::read(path, &description::Options::default(), &Budget::default());
         let mut description = read.map_err(|e| e.to_string())?;
         let overrides = Overrides {
             spp: Some(spp),

@@ -3,6 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
+use etendue::budget::Budget;
 use etendue::error::{Error, Result};
 use etendue::render::Session;
 
@@ -70,7 +71,7 @@ pub(super) struct Request<'a> {
     pub(super) output: &'a str,
     pub(super) heatmap: Option<&'a str>,
     pub(super) scene: &'a SceneArguments,
-    pub(super) memory_limit: Option<u64>,
+    pub(super) budget: &'a Budget,
 }
 
 impl Request<'_> {
@@ -120,12 +121,9 @@ impl Request<'_> {
         }
         let frame = self.numbers()[0];
         let mut session = Session::default();
-        let description = self.scene.describe(
-            input,
-            &self.scene.options(frame),
-            self.memory_limit,
-            &mut session,
-        )?;
+        let description =
+            self.scene
+                .describe(input, &self.scene.options(frame), self.budget, &mut session)?;
         overrides::chosen(&description, self.sensors)
     }
 }

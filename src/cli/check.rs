@@ -76,9 +76,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
 /// The warnings, through all sensors that are meant.
 fn check(arguments: &Arguments, input: &Path) -> Result<Vec<Problem>> {
     let (scene, image, mut session) = (&arguments.scene, &arguments.image, Session::default());
-    let memory_limit = arguments.run.memory.limit();
+    let budget = arguments.run.memory.budget();
     let read = scene.options(None);
-    let mut description = scene.describe(input, &read, memory_limit, &mut session)?;
+    let mut description = scene.describe(input, &read, &budget, &mut session)?;
     let chosen = overrides::chosen(&description, image.sensors())?;
     image.overrides().apply(&mut description);
     let mut problems = Problems::default();
@@ -88,7 +88,6 @@ fn check(arguments: &Arguments, input: &Path) -> Result<Vec<Problem>> {
             sensor: sensor.number,
             colors: image.colors(),
             threads: arguments.run.threads,
-            memory_limit,
             ..Options::default()
         };
         let found = session.check(&description, &options, &Silent);

@@ -16,6 +16,7 @@ use etendue::image;
 use etendue::sensor::Window;
 use serde_json::{Value, json};
 
+use super::memory::MemoryArguments;
 use super::{output, parse, report, status};
 
 /// Find out whether images agree
@@ -84,6 +85,8 @@ pub(super) struct Arguments {
     /// What the map of two images shows
     #[arg(long, value_enum, requires = "map", conflicts_with_all = ["a", "reference"], help_heading = TELL)]
     map_of: Option<MapOf>,
+    #[command(flatten)]
+    memory: MemoryArguments,
     /// Print a JSON object
     #[arg(long, help_heading = TELL)]
     json: bool,

@@ -8,11 +8,15 @@ use std::time::Duration;
 
 use super::output::line;
 
-/// Prints all of it: series, fits, what trees and threads bring, verdicts, and what changed.
+/// Prints all of it: the answer, series, fits, what trees and threads bring, verdicts, and what changed.
 pub(super) fn print(profile: &Profile, comparison: Option<&Comparison>) {
+    if let Some(answer) = profile.answer() {
+        line(&answer);
+    }
     line(&format!(
-        "{}: {} rounds in {}",
+        "{} on {}: {} rounds in {}",
         profile.subject,
+        profile.machine,
         profile.rounds,
         human_duration(Duration::from_secs_f64(profile.seconds))
     ));
@@ -97,15 +101,15 @@ fn growth(series: &Series, growth: &Growth) -> String {
         Model::Logarithm => format!("{a:.3} + {b:.3} [{low:.3}, {high:.3}] · log2 {axis}"),
         Model::Line => format!("{a:.3e} + {b:.3e} [{low:.2e}, {high:.2e}] · {axis}"),
     };
-    let foretold = held_out.map_or(String::new(), |off| {
-        format!("; largest foretold to {:+.1} %", 100.0 * off)
+    let predicted = held_out.map_or(String::new(), |off| {
+        format!("; largest predicted to {:+.1} %", 100.0 * off)
     });
     let from = if growth.from > 0.0 {
         format!(" from {}", growth.from)
     } else {
         String::new()
     };
-    format!("{:18} ≈ {law}{foretold}{from}", growth.quantity.name())
+    format!("{:18} ≈ {law}{predicted}{from}", growth.quantity.name())
 }
 
 fn facts(profile: &Profile) {

@@ -3,10 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use etendue::budget::human_bytes;
 use etendue::error::Result;
-use etendue::image::{self, Encoding, Limits, Picture};
+use etendue::image::{self, Encoding, Picture};
 use etendue::mesh::{self, Per, ReadOptions};
-use etendue::render::{Options, SceneInfo, Session, Silent, human_bytes};
+use etendue::render::{Options, SceneInfo, Session, Silent};
 use serde_json::{Value, json};
 
 use super::memory::RunArguments;
@@ -70,7 +71,7 @@ fn info(arguments: &Arguments, input: &Path) -> Result<Value> {
     } else if is_mesh {
         mesh_file(arguments, input)
     } else {
-        let read = image::read(input, &Limits::default())?;
+        let read = image::read(input, &arguments.run.memory.budget().open())?;
         if !arguments.quiet {
             report::warnings(&read.warnings);
         }
@@ -81,16 +82,15 @@ fn info(arguments: &Arguments, input: &Path) -> Result<Value> {
 fn scene(arguments: &Arguments, input: &Path) -> Result<Value> {
     let scene = &arguments.scene;
     let (image, mut session) = (&arguments.image, Session::default());
-    let memory_limit = arguments.run.memory.limit();
+    let budget = arguments.run.memory.budget();
     let read = scene.options(None);
-    let mut description = scene.describe(input, &read, memory_limit, &mut session)?;
+    let mut description = scene.describe(input, &read, &budget, &mut session)?;
     let chosen = overrides::chosen(&description, image.sensors())?;
     image.overrides().apply(&mut description);
     let options = Options {
         sensor: chosen.first().map_or(0, |sensor| sensor.number),
         colors: image.colors(),
         threads: arguments.run.threads,
-        memory_limit,
         ..Options::default()
     };
     let info = session.info(&description, &options, &Silent)?;
@@ -106,7 +106,7 @@ fn scene(arguments: &Arguments, input: &Path) -> Result<Value> {
 }
 
 fn mesh_file(arguments: &Arguments, input: &Path) -> Result<Value> {
-    let loaded = mesh::read(input, &ReadOptions::BARE)?;
+    let loaded = mesh::read(input, &ReadOptions::BARE, &arguments.run.memory.budget())?;
     if !arguments.quiet {
         report::warnings(&loaded.warnings);
     }

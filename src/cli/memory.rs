@@ -3,8 +3,10 @@
 use std::num::NonZeroUsize;
 
 use clap::Args;
+use etendue::budget::Budget;
 
-use super::parse;
+use super::stop::Stop;
+use super::{available, parse};
 
 pub(super) const RUN: &str = "The run";
 
@@ -27,44 +29,18 @@ pub(super) struct RunArguments {
 }
 
 impl MemoryArguments {
-    /// In bytes. Ask before anything is loaded, for what is loaded counts as taken.
-    pub(super) fn limit(&self) -> Option<u64> {
-        limit(self.memory_limit)
+    /// What may be taken. Ask before anything is loaded, for what is loaded counts as taken.
+    pub(super) fn budget(&self) -> Budget {
+        Budget::new(limit(self.memory_limit))
+    }
+
+    /// The same; a signal ends reading.
+    pub(super) fn budget_until(&self, stop: &Stop) -> Budget {
+        Budget::until(limit(self.memory_limit), stop.flag())
     }
 }
 
-/// The limit that is given, else 90 % of what is free.
+/// The limit that is given, else 90 % of what is free to this process.
 pub(super) fn limit(given: Option<u64>) -> Option<u64> {
-    given.or_else(|| available().map(|free| free / 10 * 9))
-}
-
-/// Bytes that programs can still take without swapping; known on Linux only.
-fn available() -> Option<u64> {
-    parse(&std::fs::read_to_string("/proc/meminfo").ok()?)
-}
-
-fn parse(meminfo: &str) -> Option<u64> {
-    let line = meminfo
-        .lines()
-        .find_map(|line| line.strip_prefix("MemAvailable:"))?;
-    let kibibytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
-    kibibytes.checked_mul(1024)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn what_is_available_is_read_and_what_is_odd_is_not_believed() {
-        let text = "MemTotal:       16 kB\nMemAvailable:    3 kB\n";
-        assert_eq!(parse(text), Some(3072));
-        for odd in [
-            "",
-            "MemAvailable: kB",
-            "MemAvailable: 99999999999999999999 kB",
-        ] {
-            assert_eq!(parse(odd), None, "{odd}");
-        }
-    }
+    given.or_else(|| available::bytes().map(|free| free / 10 * 9))
 }

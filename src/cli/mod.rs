@@ -15,6 +15,7 @@ mod profile;
 mod relight;
 mod render;
 
+mod available;
 mod batch;
 mod growth;
 mod memory;
@@ -64,6 +65,7 @@ const CROSSCHECK_WORKER: &str = "crosscheck-worker";
 
 /// Runs the command that the arguments name.
 pub(crate) fn run() -> ExitCode {
+    stop::Stop::instead_of_aborts();
     let result = match Arguments::parse().command {
         Command::Render(arguments) => render::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),

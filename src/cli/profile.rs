@@ -7,6 +7,7 @@ use std::thread;
 
 use clap::Args;
 use etendue::error::{Error, Result};
+use etendue::file;
 use etendue::profile::{self, Axis, Comparison, Effort, Profile, Settings, Subject, Watch};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
@@ -76,7 +77,7 @@ Examples:
   etendue profile --full --sweep O --compare before/profile.json";
 
 impl Arguments {
-    fn settings(&self) -> Result<Settings> {
+    fn settings(&self, stop: &Stop) -> Result<Settings> {
         if let Some(input) = &self.input {
             self.scene.check(input)?;
         }
@@ -101,23 +102,26 @@ impl Arguments {
             rounds: self.rounds.map(|n| n as usize),
             overrides: self.method.overrides(),
             sensor: self.method.sensor()?,
-            memory_limit: self.memory.limit(),
+            budget: self.memory.budget_until(stop),
         })
     }
 }
 
 /// Runs the command; the answer is the exit status.
 pub(super) fn run(arguments: &Arguments) -> Result<u8> {
-    let settings = arguments.settings()?;
+    let stop = Stop::on_signals()?;
+    let settings = arguments.settings(&stop)?;
     let old = arguments.compare.as_deref().map(read).transpose()?;
     if let Some(folder) = &arguments.output {
         fs::create_dir_all(folder).map_err(|e| Error::system("make the folder", folder, &e))?;
     }
-    let bar = Bar::new(arguments.quiet, Stop::on_signals()?);
+    let bar = Bar::new(arguments.quiet, stop);
     let profile = profile::run(&settings, &bar);
     bar.bar.finish_and_clear();
-    let Some(profile) = profile? else {
-        return Ok(status::INTERRUPTED);
+    let profile = match profile {
+        Ok(Some(profile)) => profile,
+        Err(error) if !bar.stop.signalled() => return Err(error),
+        _ => return Ok(status::INTERRUPTED),
     };
     let comparison = old.map(|old| profile.since(&old));
     if let Some(folder) = &arguments.output {
@@ -159,7 +163,7 @@ fn write(folder: &Path, profile: &Profile, comparison: Option<&Comparison>) -> R
     );
     for (name, text) in files {
         let path = folder.join(name);
-        fs::write(&path, text).map_err(|e| Error::system("write", &path, &e))?;
+        file::write_atomically(&path, text.as_bytes())?;
     }
     Ok(())
 }

@@ -5,10 +5,11 @@ use std::path::PathBuf;
 use clap::Args;
 use etendue::display;
 use etendue::error::{Error, Result};
-use etendue::image::{self, Limits, Metadata};
+use etendue::image::{self, Metadata};
 use etendue::relight::{self, Weight};
 use serde_json::{Value, json};
 
+use super::memory::MemoryArguments;
 use super::{output, parse, status};
 
 /// Weight the layers of an image anew, without tracing
@@ -30,11 +31,13 @@ pub(super) struct Arguments {
     /// Print a JSON object: layers with their means, weights, output
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    memory: MemoryArguments,
 }
 
 /// Runs the command; the answer is the exit status.
 pub(super) fn run(arguments: &Arguments) -> Result<u8> {
-    let image = image::read(&arguments.input, &Limits::default())?.image;
+    let image = image::read(&arguments.input, &arguments.memory.budget().open())?.image;
     let of_input = |error: Error| error.at(&etendue::error::Location::of_file(&arguments.input));
     if let Some(output) = &arguments.output {
         image::check_writable(output)?;

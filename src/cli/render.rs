@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
 use etendue::accel::{Build, Method};
+use etendue::budget::Budget;
 use etendue::compare::map::{Map, robust_top};
 use etendue::description::{self, Description};
 use etendue::display;
@@ -156,7 +157,7 @@ enum Work {
 }
 
 impl Arguments {
-    fn options(&self, item: &Item, memory_limit: Option<u64>) -> Options {
+    fn options(&self, item: &Item) -> Options {
         let checkpoint = Checkpoint {
             path: item.checkpoint(),
             every: self.checkpoint,
@@ -186,7 +187,6 @@ impl Arguments {
             sensor: item.sensor,
             pinned: false,
             checkpoint: (self.checkpoint.is_some() || self.resume).then_some(checkpoint),
-            memory_limit,
         }
     }
 
@@ -202,7 +202,7 @@ impl Arguments {
         self.skip_existing && item.output.exists() && !item.checkpoint().exists()
     }
 
-    fn batch(&self, memory_limit: Option<u64>) -> Result<Batch> {
+    fn batch(&self, budget: &Budget) -> Result<Batch> {
         let request = Request {
             inputs: &self.inputs,
             frames: self.frames.or(self.turntable.map(Frames::first)),
@@ -210,7 +210,7 @@ impl Arguments {
             output: &self.output,
             heatmap: self.heatmap.as_deref(),
             scene: &self.scene,
-            memory_limit,
+            budget,
         };
         request.batch()
     }
@@ -226,8 +226,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         return Err(Error::input(message));
     }
     let stop = Stop::on_signals()?;
-    let memory_limit = arguments.run.memory.limit();
-    let Batch { items, failed } = arguments.batch(memory_limit)?;
+    let budget = arguments.run.memory.budget_until(&stop);
+    let Batch { items, failed } = arguments.batch(&budget)?;
     output::check_distinct((items.iter()).flat_map(|i| i.files().map(|file| (file, i.name()))))?;
     let wanted = items.iter().filter(|item| !arguments.skips(item));
     output::check_writable(wanted.flat_map(Item::files))?;
@@ -235,7 +235,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         arguments,
         session: Session::default(),
         read: None,
-        memory_limit,
+        budget,
         told: Vec::new(),
         stop,
     };
@@ -252,10 +252,18 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         } else if arguments.skips(item) {
             Ending::Skipped
         } else {
-            series.item(item).unwrap_or_else(|error| {
-                report::error(&error);
-                Ending::Failed(error)
-            })
+            match series.item(item) {
+                Ok(ending) => ending,
+                Err(_) if series.stop.signalled() => {
+                    let message = format!("{}: stopped while it was read", item.name());
+                    series.warn(&Error::input(message));
+                    Ending::NotBegun
+                }
+                Err(error) => {
+                    report::error(&error);
+                    Ending::Failed(error)
+                }
+            }
         };
         summary::tell(style, item, &ending, begin.elapsed());
         endings.push((item.output.display().to_string(), ending));
@@ -276,7 +284,7 @@ struct Series<'a> {
     /// The bare mesh that was read last, and how: its frames need it read but once.
     read: Option<(PathBuf, description::Options, Description)>,
     /// Found out before anything is loaded, for a scene in memory counts as taken.
-    memory_limit: Option<u64>,
+    budget: Budget,
     /// Warnings that were told already.
     told: Vec<Problem>,
     stop: Stop,
@@ -287,7 +295,7 @@ impl Series<'_> {
         let arguments = self.arguments;
         let deadline = arguments.time_limit.map(|limit| Instant::now() + limit);
         let stop = self.stop.by(deadline);
-        let options = arguments.options(item, self.memory_limit);
+        let options = arguments.options(item);
         if arguments.checkpoint.is_some() && !arguments.resume && item.checkpoint().exists() {
             let path = item.checkpoint();
             self.warn(&Error::input(format!(
@@ -384,8 +392,8 @@ impl Series<'_> {
         {
             return Ok((options, description));
         }
-        let (limit, session) = (self.memory_limit, &mut self.session);
-        let mut description = scene.describe(&item.input, &options, limit, session)?;
+        let (budget, session) = (&self.budget, &mut self.session);
+        let mut description = scene.describe(&item.input, &options, budget, session)?;
         self.arguments.image.overrides().apply(&mut description);
         Ok((options, description))
     }

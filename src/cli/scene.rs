@@ -4,6 +4,7 @@
 use std::path::Path;
 
 use clap::{Args, ValueEnum};
+use etendue::budget::Budget;
 use etendue::description::{Description, Options};
 use etendue::error::{Error, Result};
 use etendue::render::{self, BareMesh, Session, UpAxis};
@@ -73,23 +74,23 @@ impl SceneArguments {
         self.read.options(frame)
     }
 
-    /// The scene in the file, or around the mesh in it, which may take so many bytes; the session has that mesh then.
+    /// The scene in the file, or around the mesh in it, which may take that much memory; the session has that mesh then.
     pub(super) fn describe(
         &self,
         input: &Path,
         options: &Options,
-        memory_limit: Option<u64>,
+        budget: &Budget,
         session: &mut Session,
     ) -> Result<Description> {
         self.check(input)?;
         if render::is_mesh(input) {
-            render::check_mesh(input, memory_limit)?;
+            render::check_mesh(input, budget.limit())?;
             let BareMesh { description, mesh } =
-                render::describe_mesh(input, self.up_axis(), options)?;
+                render::describe_mesh(input, self.up_axis(), options, budget)?;
             session.give(mesh);
             return Ok(description);
         }
-        Description::read(input, options)
+        Description::read(input, options, budget)
     }
 
     /// Refuses what is neither a scene nor a mesh by its name.

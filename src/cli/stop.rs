@@ -43,6 +43,17 @@ impl Stop {
         })
     }
 
+    /// Ends the process with the system's status where memory cannot be had: Rust says so and aborts.
+    pub(super) fn instead_of_aborts() {
+        #[cfg(unix)]
+        {
+            let always = Arc::new(AtomicBool::new(true));
+            let abort = signal_hook::consts::SIGABRT;
+            // Where that cannot be arranged the process aborts.
+            flag::register_conditional_shutdown(abort, status::SYSTEM.into(), always).ok();
+        }
+    }
+
     /// Ends the process at the first signal, without what it has begun to write as one of `outputs`: for what
     /// cannot be finished early.
     pub(super) fn without_a_trace(outputs: Vec<PathBuf>) -> Result<()> {
@@ -64,6 +75,11 @@ impl Stop {
             signalled: self.signalled.clone(),
             deadline,
         }
+    }
+
+    /// Set once a signal came.
+    pub(super) fn flag(&self) -> Arc<AtomicBool> {
+        self.signalled.clone()
     }
 
     /// Whether a signal came.

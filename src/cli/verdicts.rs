@@ -1,8 +1,8 @@
 //! What crosschecks came to: a paragraph or a JSON object for each scene, a table of all, and the exit status.
 
+use etendue::budget::human_bytes;
 use etendue::compare::seeds::{PlacesTest, Verdict};
 use etendue::crosscheck::{Cost, Crosscheck, Failure};
-use etendue::render::human_bytes;
 use serde_json::{Value, json};
 
 use super::{output, status};
@@ -129,29 +129,26 @@ fn lines(crosscheck: &Crosscheck) -> Vec<(&'static str, String)> {
     if let Some(verdict) = &crosscheck.verdict {
         lines.extend(judged(verdict));
     }
-    let of = |ratio: Option<f64>| ratio.map_or(String::new(), |r| format!(": {r:.2} times"));
     lines.push((
-        "seconds",
+        "time",
         format!(
-            "{:.3} here, {:.3} in Mitsuba{}",
+            "{}{:.3} s here, {:.3} s in Mitsuba",
+            takes(crosscheck.seconds_ratio),
             etendue.seconds(),
             mitsuba.seconds(),
-            of(crosscheck.seconds_ratio)
         ),
     ));
     if let Some((ours, theirs)) = etendue.cpu().zip(mitsuba.cpu()) {
+        let takes = takes(crosscheck.cpu_ratio);
         lines.push((
-            "CPU",
-            format!(
-                "{ours:.3} here, {theirs:.3} in Mitsuba{}",
-                of(crosscheck.cpu_ratio)
-            ),
+            "CPU time",
+            format!("{takes}{ours:.3} s here, {theirs:.3} s in Mitsuba"),
         ));
     }
     lines.push((
         "loading",
         format!(
-            "{:.3} here, {:.3} in Mitsuba",
+            "{:.3} s here, {:.3} s in Mitsuba",
             etendue.load.seconds, mitsuba.load.seconds
         ),
     ));
@@ -164,22 +161,35 @@ fn lines(crosscheck: &Crosscheck) -> Vec<(&'static str, String)> {
     lines
 }
 
+/// The ratio of times in words, before the times themselves.
+fn takes(ratio: Option<f64>) -> String {
+    match ratio {
+        None => String::new(),
+        Some(ratio) if ratio >= 1.0 => format!("takes {ratio:.1} times as long here: "),
+        Some(ratio) => format!("takes {:.1} times as long in Mitsuba: ", 1.0 / ratio),
+    }
+}
+
 fn judged(verdict: &Verdict) -> Vec<(&'static str, String)> {
     let mut lines = Vec::new();
     let biases = verdict.means.iter().map(|mean| {
-        let differs = if mean.agrees { "" } else { " (differs)" };
-        let channel = &mean.channel;
-        let [bias, half_width] = [mean.difference, mean.half_width].map(|part| 100.0 * part);
-        format!("{channel} {bias:+.3} ± {half_width:.3} %{differs}")
+        let half_width = 100.0 * mean.half_width;
+        let trust = if mean.agrees {
+            "which may be chance"
+        } else {
+            "which is no chance"
+        };
+        let words = mean.in_words("Étendue");
+        format!("{words} (± {half_width:.3} %, {trust})")
     });
-    lines.push(("bias", biases.collect::<Vec<_>>().join(", ")));
+    lines.push(("mean", biases.collect::<Vec<_>>().join(", ")));
     for (label, test) in [("tiles", &verdict.tiles), ("pixels", &verdict.pixels)] {
         lines.push((label, places(test)));
     }
     let ratio = verdict.noise.ratio;
     lines.push((
         "noise",
-        format!("relMSE is {ratio:.2} times what the seeds explain"),
+        format!("pixels differ {ratio:.2} times as much as seeds among themselves (relMSE)"),
     ));
     lines
 }

@@ -110,6 +110,7 @@ fn scaled(rgb: [f32; 3]) -> (f32, [f32; 3]) {
 impl<const N: usize> ColorModel for Bands<N> {
     type Stored = Spectrum;
     type Texels = Vec<SpectralTexel>;
+    const TEXEL_BYTES: usize = size_of::<SpectralTexel>();
     /// nm; 0 in the lanes that are not in use.
     type Wavelengths = [f32; N];
     type Sample = Samples<N>;

@@ -51,6 +51,8 @@ pub trait ColorModel: Clone + std::fmt::Debug + Send + Sync + 'static {
     type Stored: Clone + std::fmt::Debug + Send + Sync;
     /// An image's colours, ready to be evaluated: small, for there are millions.
     type Texels: Clone + std::fmt::Debug + Send + Sync;
+    /// The most bytes of a texel.
+    const TEXEL_BYTES: usize;
     /// The wavelengths that one path carries.
     type Wavelengths: Copy + std::fmt::Debug + Send + Sync;
     /// One value for each of them.

@@ -14,6 +14,7 @@ pub struct Mono;
 impl ColorModel for Mono {
     type Stored = f32;
     type Texels = Vec<f32>;
+    const TEXEL_BYTES: usize = size_of::<f32>();
     type Wavelengths = ();
     type Sample = Samples<1>;
     type Columns<F: Lanes> = Columns<F, 1>;

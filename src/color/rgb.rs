@@ -15,6 +15,7 @@ pub struct Rgb;
 impl ColorModel for Rgb {
     type Stored = [f32; 3];
     type Texels = Packed;
+    const TEXEL_BYTES: usize = size_of::<[f32; 3]>();
     type Wavelengths = ();
     type Sample = Samples<3>;
     type Columns<F: Lanes> = Columns<F, 3>;

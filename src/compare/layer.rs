@@ -6,9 +6,10 @@ use std::path::Path;
 
 use serde::Serialize;
 
+use crate::budget::Budget;
 use crate::color::srgb;
 use crate::error::{Error, Location, Result};
-use crate::image::{self, Encoding, Image, Limits, Picture};
+use crate::image::{self, Encoding, Image, Picture};
 
 /// A window of an image, in pixels from its upper left corner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -72,10 +73,13 @@ impl Layer {
     /// Reads a file.
     ///
     /// # Errors
-    /// Where the file cannot be read, or lacks what is selected.
-    pub fn read(path: &Path, selection: &Selection) -> Result<Self> {
-        let picture = image::read(path, &Limits::default())?;
-        Self::of(&picture, selection).map_err(|e| e.at(&Location::of_file(path)))
+    /// Where the file cannot be read, lacks what is selected or is larger than the budget allows.
+    pub fn read(path: &Path, selection: &Selection, budget: &Budget) -> Result<Self> {
+        let account = budget.open();
+        let picture = image::read(path, &account)?;
+        let layer = Self::of(&picture, selection).map_err(|e| e.at(&Location::of_file(path)))?;
+        account.keep(size_of_val(layer.image.data()) as u64);
+        Ok(layer)
     }
 
     /// Selects from a picture.

@@ -46,6 +46,35 @@ pub struct MeanTest {
     pub agrees: bool,
 }
 
+impl MeanTest {
+    /// Such as `B is 2.0 % brighter`, or `B has 2.0 % more R`; `b` names the second side.
+    pub fn in_words(&self, b: &str) -> String {
+        brighter(b, &self.channel, self.a, self.difference)
+    }
+}
+
+/// By how much the side `b` is brighter, in words: `difference` is in parts of side a's mean, where that is not 0.
+pub fn brighter(b: &str, channel: &str, a: f64, difference: f64) -> String {
+    let size = match a {
+        0.0 => format!("{:.3e}", difference.abs()),
+        _ if difference.abs() >= 1.0 => {
+            return format!("{b} has {:.1} times the {channel}", 1.0 + difference);
+        }
+        _ => {
+            let percent = 100.0 * difference.abs();
+            let digits = if percent < 1.0 { 3 } else { 1 };
+            format!("{percent:.digits$} %")
+        }
+    };
+    match (channel, difference) {
+        (_, 0.0) => format!("{b} is as bright"),
+        ("luminance", d) if d > 0.0 => format!("{b} is {size} brighter"),
+        ("luminance", _) => format!("{b} is {size} darker"),
+        (channel, d) if d > 0.0 => format!("{b} has {size} more {channel}"),
+        (channel, _) => format!("{b} has {size} less {channel}"),
+    }
+}
+
 /// Tests of many places at once.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PlacesTest {
@@ -315,7 +344,7 @@ fn sentence(verdict: &Verdict) -> String {
         };
         return format!(
             "A and B agree: {na} and {nb} seeds show no difference at {confidence} % confidence; \
-             one of the mean {} above {relative} would have shown",
+             had the mean {} differed by more than {relative}, they would have",
             mean.channel
         );
     }
@@ -340,7 +369,12 @@ fn sentence(verdict: &Verdict) -> String {
         }
     }
     format!(
-        "A and B differ at {confidence} % confidence, by {na} and {nb} seeds, in {}",
-        found.join(", ")
+        "A and B differ at {confidence} % confidence, by {na} and {nb} seeds, in {}{}",
+        found.join(", "),
+        if verdict.means[0].agrees {
+            String::new()
+        } else {
+            format!("; {}", verdict.means[0].in_words("B"))
+        }
     )
 }

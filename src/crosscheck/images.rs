@@ -4,19 +4,20 @@
 use std::path::Path;
 
 use super::Failure;
+use crate::budget::Budget;
 use crate::compare::map::{Map, robust_top};
 use crate::compare::seeds::{self, Verdict};
 use crate::compare::{Layer, Selection};
 use crate::display;
 use crate::error::Error;
-use crate::image::{self, Image, Limits, Metadata};
+use crate::image::{self, Image, Metadata};
 
 /// The probability that two sides of one image are found to agree.
 const CONFIDENCE: f64 = 0.99;
 
 /// Reads the main colour of a render.
 pub(super) fn read(path: &Path) -> Result<Layer, Failure> {
-    let picture = image::read(path, &Limits::default())?;
+    let picture = image::read(path, &Budget::default().open())?;
     Layer::of(&picture, &Selection::default()).map_err(not_comparable)
 }
 

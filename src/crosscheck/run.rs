@@ -13,12 +13,30 @@ use super::images::{self, Images};
 use super::order::{Order, Reply};
 use super::process::Worker;
 use super::{Failure, Settings, Side, Watch};
+use crate::budget::Budget;
 use crate::compare::Layer;
 use crate::compare::seeds::Verdict;
+use crate::description::{self, Description};
 use crate::error::Error;
 
 /// Mitsuba's side.
 const WORKER: &str = include_str!("worker.py");
+/// The values that are given, and those that follow from them here and do not in Mitsuba.
+fn defines(scene: &Path, settings: &Settings) -> Vec<(String, String)> {
+    let mut defines = settings.defines.clone();
+    if !defines.is_empty() {
+        let options = description::Options {
+            defines: defines.clone(),
+            ..description::Options::default()
+        };
+        // What is wrong with the scene is told by who renders it.
+        if let Ok(read) = Description::read(scene, &options, &Budget::default()) {
+            defines.extend_from_slice(read.implied());
+        }
+    }
+    defines
+}
+
 /// What Mitsuba is taught of Étendue's plugins.
 const PLUGINS: [(&str, &str); 3] = [
     ("ambient.py", include_str!("../../tools/mitsuba/ambient.py")),
@@ -70,7 +88,7 @@ pub fn crosscheck(
     let overrides = &settings.overrides;
     let order = |scene: &Path| Order {
         scene: scene.to_owned(),
-        defines: settings.defines.clone(),
+        defines: defines(scene, settings),
         strict: settings.strict,
         size: overrides.size,
         crop: overrides.crop.map(|w| [w.x, w.y, w.width, w.height]),

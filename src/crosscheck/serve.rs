@@ -6,6 +6,7 @@ use std::num::NonZeroUsize;
 
 use super::cost::Clock;
 use super::order::{Loaded, Order, Rendered, Reply};
+use crate::budget::Budget;
 use crate::description::{self, Description, Kind, NodeId, Properties, Value};
 use crate::display;
 use crate::error::{Error, Result};
@@ -92,7 +93,7 @@ impl Scene {
             strict: order.strict,
             ..description::Options::default()
         };
-        let mut description = Description::read(&order.scene, &read)?;
+        let mut description = Description::read(&order.scene, &read, &Budget::default())?;
         let sensor = match &order.sensor {
             Some(name) => find_sensor(&description, name)?,
             None => 0,

@@ -12,11 +12,19 @@ use crate::error::{Error, Result};
 /// Bytes that all substitutions of a scene together may write.
 const MAX_SUBSTITUTED: usize = 64 << 20;
 
+/// The parameters that hold an image's size, as all scenes around Mitsuba call them. Where the command line gives one, the
+/// other follows, so that the picture keeps its shape.
+const SIDES: [&str; 2] = ["resx", "resy"];
+
 #[derive(Debug, Default)]
 pub(super) struct Defines {
     values: BTreeMap<String, Define>,
     /// Names that the file gives a default or asks for.
     known: BTreeSet<String>,
+    /// What the file says of [`SIDES`].
+    sides: [Option<f64>; 2],
+    /// Values that follow from the command line's.
+    implied: Vec<(String, String)>,
     substituted: usize,
 }
 
@@ -59,6 +67,41 @@ impl Defines {
                 given: false,
                 used: false,
             });
+        if let Some(side) = SIDES.iter().position(|side| *side == name) {
+            let length = value.trim().parse().ok().filter(|length| *length > 0.0);
+            self.sides[side] = self.sides[side].or(length);
+            self.keep_aspect();
+        }
+    }
+
+    /// Where the file has both sides and the command line gives one of them, the other follows.
+    fn keep_aspect(&mut self) {
+        let [Some(width), Some(height)] = self.sides else {
+            return;
+        };
+        let given = SIDES.map(|side| {
+            let define = self.values.get(side).filter(|define| define.given)?;
+            define.value.trim().parse::<f64>().ok()
+        });
+        let (side, length) = match given {
+            [Some(width_given), None] => (1, width_given * height / width),
+            [None, Some(height_given)] => (0, height_given * width / height),
+            _ => return,
+        };
+        let length = length.round().max(1.0);
+        let other = self
+            .values
+            .get_mut(SIDES[side])
+            .filter(|other| !other.given);
+        if let Some(other) = other.filter(|_| length < f64::from(u32::MAX)) {
+            other.value = length.to_string();
+            self.implied = vec![(SIDES[side].to_owned(), other.value.clone())];
+        }
+    }
+
+    /// Values of parameters that follow from what the command line gives.
+    pub(super) fn implied(&self) -> &[(String, String)] {
+        &self.implied
     }
 
     /// `text` with every parameter replaced; what is put in is not looked at again.
@@ -203,6 +246,37 @@ mod tests {
         let message = report.finish().unwrap_err().to_string();
         assert!(message.contains("no parameter $ssp"), "{message}");
         assert!(message.contains("did you mean \"spp\"?"), "{message}");
+    }
+
+    #[test]
+    fn of_an_image_s_sides_one_follows_from_the_other() {
+        let pair = |name: &str, value: &str| (name.to_owned(), value.to_owned());
+        let after = |given: &[(&str, &str)], names: [&str; 2]| {
+            let given: Vec<_> = given
+                .iter()
+                .map(|(name, value)| pair(name, value))
+                .collect();
+            let mut d = Defines::new(&given, &[]);
+            for name in names {
+                d.set_default(name, if name == "resx" { "400" } else { "300" });
+            }
+            d.substitute("$resx,$resy")
+                .map(Cow::into_owned)
+                .unwrap_or_default()
+        };
+        for names in [["resx", "resy"], ["resy", "resx"]] {
+            assert_eq!(after(&[], names), "400,300");
+            assert_eq!(after(&[("resx", "200")], names), "200,150");
+            assert_eq!(after(&[("resy", "1")], names), "1,1");
+            assert_eq!(after(&[("resx", "200"), ("resy", "7")], names), "200,7");
+            assert_eq!(after(&[("resx", "wide")], names), "wide,300");
+        }
+        assert_eq!(after(&[("resx", "200")], ["resx", "spp"]), "");
+        let mut d = Defines::new(&[pair("resx", "8")], &[]);
+        d.set_default("resx", "4");
+        d.set_default("resy", "none");
+        assert!(d.implied().is_empty());
+        assert_eq!(d.substitute("$resy").unwrap(), "none");
     }
 
     #[test]

@@ -32,6 +32,7 @@ pub use self::canonical::{Canonical, Part};
 pub use self::properties::Properties;
 use self::reader::Reader;
 use self::resolve::Scopes;
+use crate::budget::Budget;
 use crate::error::{Location, Problem, Result};
 
 /// A node's place in its [`Description`].
@@ -220,8 +221,12 @@ pub struct Description {
     warnings: Vec<Problem>,
     /// As [`Description::sources`].
     sources: Vec<PathBuf>,
+    /// As [`Description::implied`].
+    implied: Vec<(String, String)>,
     /// As [`Options::strict`].
     strict: bool,
+    /// What reading files that it names may take.
+    budget: Budget,
 }
 
 impl Description {
@@ -237,21 +242,41 @@ impl Description {
         &self.sources
     }
 
-    /// Reads the scene file at `path`.
+    /// Values of the scene's parameters that follow from those that the options give: of `resx` and `resy`, where the
+    /// scene has both, one follows from the other, so that the picture keeps its shape.
+    pub fn implied(&self) -> &[(String, String)] {
+        &self.implied
+    }
+
+    /// Reads the scene file at `path`, within a budget that the files which it names will share.
     ///
     /// # Errors
     /// Names every place in the file, or in one it includes, that says something wrong; an XML syntax error alone
     /// ends the search at once.
-    pub fn read(path: &Path, options: &Options) -> Result<Self> {
-        Reader::new(options).file(path)
+    pub fn read(path: &Path, options: &Options, budget: &Budget) -> Result<Self> {
+        let mut description = Reader::new(options, budget).file(path)?;
+        description.budget = budget.clone();
+        Ok(description)
+    }
+
+    /// What reading the files that it names may take.
+    pub fn budget(&self) -> &Budget {
+        &self.budget
+    }
+
+    /// The same, with another budget.
+    #[must_use]
+    pub fn within(mut self, budget: &Budget) -> Self {
+        self.budget = budget.clone();
+        self
     }
 
     /// Reads a scene from `text`. Messages name `path`, and its folder is the base of relative file names.
     ///
     /// # Errors
-    /// As [`Description::read`].
+    /// As [`Description::read`], without a limit on memory.
     pub fn parse(text: &str, path: &Path, options: &Options) -> Result<Self> {
-        Reader::new(options).scene(text, path)
+        Reader::new(options, &Budget::default()).scene(text, path)
     }
 
     /// The scene itself.

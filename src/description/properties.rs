@@ -8,6 +8,7 @@ use glam::{DMat4, DVec3};
 
 use super::declared::{Plugin, Preset, Row, Short, Takes};
 use super::{Description, Kind, Node, NodeId, Property, Value};
+use crate::budget::Budget;
 use crate::error::{Error, Location, Result};
 use crate::math::{Moving, Transform};
 
@@ -408,6 +409,11 @@ impl<'a> Properties<'a> {
     /// All properties in file order.
     pub fn all(&self) -> &'a [Property] {
         &self.node.properties
+    }
+
+    /// What reading files that the scene names may take.
+    pub fn budget(&self) -> &'a Budget {
+        &self.description.budget
     }
 
     /// Whether what Mitsuba 3 does not read is an error.

@@ -58,7 +58,8 @@ pub fn save_window(path: &Path, image: &Image, window: &Window, metadata: &Metad
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::image::{Encoding, Limits};
+    use crate::budget::Budget;
+    use crate::image::Encoding;
 
     #[test]
     fn one_image_leaves_in_every_format_linear_or_encoded() {
@@ -72,7 +73,7 @@ mod tests {
         ] {
             let path = folder.path().join(name);
             save(&path, &image, &Metadata::default()).unwrap();
-            let back = image::read(&path, &Limits::default()).unwrap();
+            let back = image::read(&path, &Budget::default().open()).unwrap();
             assert_eq!(back.encoding, encoding, "{name}");
             assert_eq!(back.image.get(0, 0, 0), red, "{name}");
         }

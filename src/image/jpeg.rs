@@ -5,8 +5,9 @@
 use libjpeg_turbo_rs::{DecodeLimits, Decoder, JpegError, PixelFormat};
 
 use super::raster::{check_size, codes};
+use crate::budget::Account;
 use crate::error::{Error, Result};
-use crate::image::{Encoding, Image, Limits, Picture};
+use crate::image::{Encoding, Image, Picture};
 
 /// How many bytes of samples a byte of the file can make: 64 in a bit.
 const MOST_PER_BYTE: u64 = 4096;
@@ -14,11 +15,11 @@ const MOST_PER_BYTE: u64 = 4096;
 const MOST_SCANS: usize = 1000;
 
 /// Decodes the bytes of a JPEG file.
-pub(super) fn decode(bytes: &[u8], limits: &Limits) -> Result<Picture> {
+pub(super) fn decode(bytes: &[u8], account: &Account) -> Result<Picture> {
     const END_OF_IMAGE: [u8; 2] = [0xff, 0xd9];
-    match decode_marked(bytes, limits) {
+    match decode_marked(bytes, account) {
         // Of several scans the decoder wants to see the end.
-        Err(Refusal::Early) => decode_marked(&[bytes, &END_OF_IMAGE].concat(), limits),
+        Err(Refusal::Early) => decode_marked(&[bytes, &END_OF_IMAGE].concat(), account),
         result => result,
     }
     .map_err(|refusal| match refusal {
@@ -50,7 +51,7 @@ impl From<JpegError> for Refusal {
     }
 }
 
-fn decode_marked(bytes: &[u8], limits: &Limits) -> std::result::Result<Picture, Refusal> {
+fn decode_marked(bytes: &[u8], account: &Account) -> std::result::Result<Picture, Refusal> {
     let most = DecodeLimits {
         max_width: u16::MAX.into(),
         max_height: u16::MAX.into(),
@@ -76,7 +77,7 @@ fn decode_marked(bytes: &[u8], limits: &Limits) -> std::result::Result<Picture, 
         let error = Error::unsupported(format!("a JPEG of {bits} bits a sample"));
         return Err(error.help("convert it to 8 bits").into());
     }
-    check_size([width, height], names.len(), MOST_PER_BYTE, bytes, limits)?;
+    check_size([width, height], names.len(), MOST_PER_BYTE, bytes, account)?;
     decoder.set_output_format(pixels);
     // As libjpeg does where a progressive file lacks its last scans.
     decoder.set_block_smoothing(true);

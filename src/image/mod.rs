@@ -16,6 +16,7 @@ mod view;
 
 use std::cell::Cell;
 use std::fs;
+use std::io::Read;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
@@ -26,6 +27,7 @@ pub use metadata::{MetaValue, Metadata, Window};
 pub use openexr::check_channels;
 pub use view::View;
 
+use crate::budget::Account;
 use crate::error::{Error, Location, Problem, Result};
 use crate::file;
 use format::Decoder;
@@ -52,54 +54,24 @@ pub struct Picture {
     pub warnings: Vec<Problem>,
 }
 
-/// How much memory reading a file may take.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Limits {
-    /// Bytes of the decoded image, and bytes of the file.
-    pub max_bytes: u64,
-}
-
-impl Default for Limits {
-    /// 8 GiB.
-    fn default() -> Self {
-        Self { max_bytes: 8 << 30 }
-    }
-}
-
-impl Limits {
-    /// Refuses an image that takes `bytes` when decoded.
-    fn check(&self, width: u64, height: u64, bytes: u128) -> Result<()> {
-        if bytes > u128::from(self.max_bytes) {
-            return Err(Error::input(format!(
-                "the image of {width} × {height} pixels takes {bytes} bytes, more than the {} allowed",
-                self.max_bytes
-            )));
-        }
-        Ok(())
-    }
-}
-
-/// Reads an image file of any known format; its content, not its name, says which.
+/// Reads an image file of any known format; its content, not its name, says which. The account is asked for all that
+/// this takes.
 ///
 /// # Errors
-/// Where the file is missing, unknown, damaged, cut off or larger than `limits` allows.
-pub fn read(path: &Path, limits: &Limits) -> Result<Picture> {
+/// Where the file is missing, unknown, damaged, cut off or larger than the budget allows.
+pub fn read(path: &Path, account: &Account) -> Result<Picture> {
     let refused = |e: std::io::Error| Error::system("read", path, &e);
     let there = fs::metadata(path).map_err(refused)?;
     if !there.is_file() {
         return Err(Error::input(format!("{} is not a file", path.display())));
     }
-    if there.len() > limits.max_bytes {
-        return Err(Error::input(format!(
-            "the file has {} bytes, more than the {} allowed",
-            there.len(),
-            limits.max_bytes
-        ))
-        .at(&Location::of_file(path)));
-    }
-    let bytes = fs::read(path).map_err(refused)?;
     let place = Location::of_file(path);
-    let mut picture = decode(path, &bytes, limits).map_err(|e| e.at(&place))?;
+    account.take(there.len()).map_err(|e| e.at(&place))?;
+    let mut bytes = Vec::new();
+    let file = file::open(path).map_err(refused)?;
+    // A file that grows meanwhile is read as long as it was.
+    (file.take(there.len()).read_to_end(&mut bytes)).map_err(refused)?;
+    let mut picture = decode(path, &bytes, account).map_err(|e| e.at(&place))?;
     for warning in &mut picture.warnings {
         warning.location.get_or_insert_with(|| place.clone());
     }
@@ -107,12 +79,12 @@ pub fn read(path: &Path, limits: &Limits) -> Result<Picture> {
 }
 
 /// Decodes the bytes of an image file; `path` only tells TGA from what is no image.
-fn decode(path: &Path, bytes: &[u8], limits: &Limits) -> Result<Picture> {
+fn decode(path: &Path, bytes: &[u8], account: &Account) -> Result<Picture> {
     let decoder = Decoder::of_input(path, bytes)?;
     // The checks before it should leave a decoder nothing to panic about. It is other people's code
     // on a stranger's file, though, so a panic that slips through is one more kind of damaged file.
     // Nothing that it could leave half-changed survives it.
-    guarded(|| decode_by(decoder, bytes, limits))
+    guarded(|| decode_by(decoder, bytes, account))
 }
 
 thread_local! {
@@ -132,13 +104,13 @@ pub fn is_decoding() -> bool {
     DECODING.get()
 }
 
-fn decode_by(decoder: Decoder, bytes: &[u8], limits: &Limits) -> Result<Picture> {
+fn decode_by(decoder: Decoder, bytes: &[u8], account: &Account) -> Result<Picture> {
     match decoder {
-        Decoder::Exr => openexr::decode(bytes, limits),
-        Decoder::Hdr => radiance::decode(bytes, limits),
-        Decoder::Jpeg => jpeg::decode(bytes, limits),
-        Decoder::Pfm => pfm::decode(bytes, limits),
-        Decoder::Raster(format) => raster::decode(bytes, format, limits),
+        Decoder::Exr => openexr::decode(bytes, account),
+        Decoder::Hdr => radiance::decode(bytes, account),
+        Decoder::Jpeg => jpeg::decode(bytes, account),
+        Decoder::Pfm => pfm::decode(bytes, account),
+        Decoder::Raster(format) => raster::decode(bytes, format, account),
     }
 }
 

@@ -3,8 +3,9 @@
 //! floats, the bottom row first. Values are linear.
 
 use super::raster::check_size;
+use crate::budget::Account;
 use crate::error::{Error, Result};
-use crate::image::{Encoding, Image, Limits, Picture};
+use crate::image::{Encoding, Image, Picture};
 
 /// The next word of the header, and what follows the one space or line end behind it.
 fn word(bytes: &[u8]) -> Option<(&str, &[u8])> {
@@ -40,7 +41,7 @@ impl<'a> Header<'a> {
 }
 
 /// Decodes the bytes of a PFM file.
-pub(super) fn decode(bytes: &[u8], limits: &Limits) -> Result<Picture> {
+pub(super) fn decode(bytes: &[u8], account: &Account) -> Result<Picture> {
     let names: &[&str] = if bytes.starts_with(b"PF") {
         &["R", "G", "B"]
     } else {
@@ -56,7 +57,7 @@ pub(super) fn decode(bytes: &[u8], limits: &Limits) -> Result<Picture> {
         scale,
         pixels,
     } = header;
-    check_size([width, height], names.len(), 1, bytes, limits)?;
+    check_size([width, height], names.len(), 1, bytes, account)?;
     let length = width as usize * names.len();
     let Some(pixels) = pixels.get(..length * height as usize * 4) else {
         return Err(Error::input("the file ends too early"));

@@ -8,9 +8,10 @@ use ::image::Rgb;
 use ::image::codecs::hdr::{HdrDecoder, HdrEncoder};
 
 use super::raster::{bytes_of, check_size, refused};
+use crate::budget::Account;
 use crate::color::Primaries;
 use crate::error::{Error, Result};
-use crate::image::{Encoding, Image, Limits, Picture};
+use crate::image::{Encoding, Image, Picture};
 
 /// The range of the shared exponent; what is smaller becomes 0, what is larger the largest.
 const SMALLEST: f32 = 1e-38;
@@ -83,14 +84,14 @@ fn resolution(line: &[u8]) -> Result<Option<[u32; 2]>> {
 }
 
 /// Decodes the bytes of a Radiance HDR file.
-pub(super) fn decode(bytes: &[u8], limits: &Limits) -> Result<Picture> {
+pub(super) fn decode(bytes: &[u8], account: &Account) -> Result<Picture> {
     let Header {
         width,
         height,
         xyz,
         pixels,
     } = Header::read(bytes)?;
-    check_size([width, height], 3, MOST_PER_BYTE, bytes, limits)?;
+    check_size([width, height], 3, MOST_PER_BYTE, bytes, account)?;
     // The crate decodes the pixels, but does not know all headers that are in use.
     let header = format!("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y {height} +X {width}\n");
     let whole = Cursor::new(header).chain(pixels);

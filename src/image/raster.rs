@@ -6,13 +6,14 @@ use std::io::Cursor;
 
 use ::image::{ColorType, ImageDecoder, ImageError, ImageFormat, ImageReader};
 
+use crate::budget::Account;
 use crate::error::{Error, Result};
-use crate::image::{Encoding, Image, Limits, Picture};
+use crate::image::{Encoding, Image, Picture};
 
 /// Decodes the bytes of a file of this format.
-pub(super) fn decode(bytes: &[u8], format: ImageFormat, limits: &Limits) -> Result<Picture> {
+pub(super) fn decode(bytes: &[u8], format: ImageFormat, account: &Account) -> Result<Picture> {
     let mut allowed = ::image::Limits::default();
-    allowed.max_alloc = Some(limits.max_bytes);
+    allowed.max_alloc = account.left();
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
     reader.limits(allowed);
     let decoder = reader.into_decoder().map_err(refused)?;
@@ -25,7 +26,7 @@ pub(super) fn decode(bytes: &[u8], format: ImageFormat, limits: &Limits) -> Resu
         ImageFormat::Png => 1032 * 8 * 4,
         _ => 4096,
     };
-    check_size([width, height], names.len(), most_per_byte, bytes, limits)?;
+    check_size([width, height], names.len(), most_per_byte, bytes, account)?;
     let raw = bytes_of(decoder)?;
     let data = match color {
         ColorType::L16 | ColorType::La16 | ColorType::Rgb16 | ColorType::Rgba16 => {
@@ -87,7 +88,7 @@ pub(super) fn check_size(
     channels: usize,
     most_per_byte: u64,
     bytes: &[u8],
-    limits: &Limits,
+    account: &Account,
 ) -> Result<()> {
     if width == 0 || height == 0 {
         return Err(Error::input("the image has no pixels"));
@@ -99,5 +100,7 @@ pub(super) fn check_size(
             bytes.len()
         )));
     }
-    limits.check(width.into(), height.into(), samples * 4)
+    // As numbers, and at most so many bytes as the decoder has them.
+    let bytes = u64::try_from(samples * 8).unwrap_or(u64::MAX);
+    account.take_for(bytes, &format!("the image of {width} × {height} pixels"))
 }

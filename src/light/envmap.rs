@@ -63,7 +63,8 @@ impl<C: ColorModel> Envmap<C> {
         let path = properties.file("filename")?;
         let scale = properties.float("scale")?;
         let to_world = Rotation::of(properties)?;
-        let picture = Picture::read(&path, false).map_err(|e| e.at(properties.location()))?;
+        let picture = Picture::read(&path, false, properties.budget())
+            .map_err(|e| e.at(properties.location()))?;
         let picture = completed(picture);
         let [width, height] = picture.size;
         let color = &context.palettes.colors.color;
@@ -71,7 +72,7 @@ impl<C: ColorModel> Envmap<C> {
         Ok(Self {
             width,
             height,
-            texels: color.texels(&picture.pixels, Role::Emission),
+            texels: picture.into_texels(color, Role::Emission)?,
             scale: scale as f32,
             to_world,
             cells: Grid::new(width, &weights).filter(|_| scale > 0.0),
@@ -151,22 +152,22 @@ impl<C: ColorModel> Envmap<C> {
 const LEAST_ROWS: usize = 3;
 
 /// With rows enough: those that the image lacks are its last one, as in Mitsuba.
-fn completed(Picture { size, pixels }: Picture) -> Picture {
-    let [width, height] = size;
+fn completed(mut picture: Picture) -> Picture {
+    let [width, height] = picture.size;
     if height >= LEAST_ROWS {
-        return Picture { size, pixels };
+        return picture;
     }
     let last = (width * (height - 1)..width * height).cycle();
     let lacking = last.take(width * (LEAST_ROWS - height));
     let all = (0..width * height).chain(lacking);
-    Picture {
-        size: [width, LEAST_ROWS],
-        pixels: Pixels::Linear(all.map(|index| pixels.get(index)).collect()),
-    }
+    let pixels = all.map(|index| picture.pixels.get(index)).collect();
+    picture.size[1] = LEAST_ROWS;
+    picture.pixels = Pixels::Linear(pixels);
+    picture
 }
 
 /// What each cell may emit, row by row.
-fn weights(Picture { size, pixels }: &Picture) -> Vec<f64> {
+fn weights(Picture { size, pixels, .. }: &Picture) -> Vec<f64> {
     let [width, height] = *size;
     let bright: Vec<f32> = (pixels.iter())
         .map(|rgb| luminance(rgb.map(f32::abs)))

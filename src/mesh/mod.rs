@@ -224,6 +224,12 @@ impl Mesh {
             + attributes.sum::<usize>()
     }
 
+    /// Bytes that the mesh holds on the heap when all of its vertices have normals.
+    pub fn room(&self) -> u64 {
+        let missing = self.positions.len() - self.normals.len().min(self.positions.len());
+        (self.bytes() + missing * size_of::<Vec3>()) as u64
+    }
+
     /// Gives back memory that the arrays do not need.
     pub(crate) fn shrink(&mut self) {
         self.positions.shrink_to_fit();

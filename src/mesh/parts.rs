@@ -7,9 +7,10 @@ use std::path::Path;
 
 use super::far::Far;
 use super::read::{
-    Decoded, Input, Loaded, ReadOptions, extension, read_near, warnings, with_input,
+    Decoded, Input, Loaded, ReadOptions, extension, read_near, read_on, warnings, with_input,
 };
-use super::{Attribute, Mesh, Per, gltf, obj, read, serialized};
+use super::{Attribute, Mesh, Per, gltf, obj, serialized};
+use crate::budget::{Account, Budget};
 use crate::error::{Error, Location, Problem, Result};
 use crate::file::text;
 
@@ -39,15 +40,16 @@ const MOST: usize = 1 << 16;
 /// Reads the file `path` part by part, whose extension says the format, as [bare](ReadOptions::bare).
 ///
 /// # Errors
-/// As [`read`] has them; where there are more than 65536 parts.
-pub fn read_parts(path: &Path) -> Result<Parts> {
+/// As [`read`](super::read()) has them; where there are more than 65536 parts.
+pub fn read_parts(path: &Path, budget: &Budget) -> Result<Parts> {
+    let account = budget.open();
     let parts = match extension(path).as_str() {
-        "gltf" | "glb" => gltf_parts(path)?,
-        "obj" => obj_parts(path)?,
-        "serialized" => serialized_parts(path)?,
+        "gltf" | "glb" => gltf_parts(path, &account)?,
+        "obj" => obj_parts(path, &account)?,
+        "serialized" => serialized_parts(path, &account)?,
         _ => {
             let mut parts = Parts::default();
-            parts.add(String::new(), read(path, &ReadOptions::BARE)?);
+            parts.add(String::new(), read_on(path, &ReadOptions::BARE, &account)?);
             parts
         }
     };
@@ -58,6 +60,7 @@ pub fn read_parts(path: &Path) -> Result<Parts> {
         );
         return Err(Error::input(message).at(&Location::of_file(path)));
     }
+    account.keep(parts.parts.iter().map(|part| part.mesh.room()).sum());
     Ok(parts)
 }
 
@@ -79,8 +82,8 @@ impl Parts {
     }
 }
 
-fn gltf_parts(path: &Path) -> Result<Parts> {
-    let scene = gltf::read_gltf(path, &ReadOptions::default())?;
+fn gltf_parts(path: &Path, account: &Account) -> Result<Parts> {
+    let scene = gltf::read_gltf(path, &ReadOptions::default(), account)?;
     let part = |part: gltf::GltfPart| {
         let mut mesh = part.mesh;
         if mesh.normals.is_empty() {
@@ -97,15 +100,17 @@ fn gltf_parts(path: &Path) -> Result<Parts> {
     })
 }
 
-fn serialized_parts(path: &Path) -> Result<Parts> {
+fn serialized_parts(path: &Path, account: &Account) -> Result<Parts> {
     let mut parts = Parts::default();
-    let mut meshes = with_input(path, serialized::read_all)?;
+    let mut meshes = with_input(path, account, serialized::read_all)?;
     let bounds = meshes.iter().filter_map(Mesh::bounds);
     let bounds = bounds.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
     // One origin for all, so that they stay together.
     if let Some(far) = bounds.and_then(Far::of_bounds) {
         let origin = far.origin;
-        meshes = with_input(path, |input| {
+        drop(meshes);
+        account.clear();
+        meshes = with_input(path, account, |input| {
             serialized::read_all(Input { origin, ..input })
         })?;
         parts.warnings = warnings(path, vec![far.moved()]);
@@ -120,17 +125,18 @@ fn serialized_parts(path: &Path) -> Result<Parts> {
     Ok(parts)
 }
 
-fn obj_parts(path: &Path) -> Result<Parts> {
+fn obj_parts(path: &Path, account: &Account) -> Result<Parts> {
     /// Keeps step with the triangles where some are dropped.
     const PART: &str = "face_part";
-    let bytes = with_input(path, |input| input.bytes())?;
+    let bytes = with_input(path, account, |input| input.bytes())?;
     let groups = Groups::of(&bytes);
     let is_split = (2..=MOST).contains(&groups.names.len());
-    let mut loaded = read_near(path, &ReadOptions::BARE, |origin| {
+    let mut loaded = read_near(path, &ReadOptions::BARE, account, |origin| {
         let input = Input {
             path,
             length: bytes.len() as u64,
             origin,
+            account,
             reader: &mut &bytes[..],
         };
         let mut decoded = obj::read(input, &ReadOptions::BARE)?;
@@ -289,7 +295,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join(name);
         std::fs::write(&path, bytes).unwrap();
-        read_parts(&path).unwrap()
+        read_parts(&path, &Budget::default()).unwrap()
     }
 
     #[test]

@@ -42,6 +42,9 @@ struct Concave {
 }
 
 impl Polygons {
+    /// Bytes that a polygon takes.
+    pub(super) const ROW: usize = size_of::<Fan>();
+
     pub(super) fn new(bare: bool) -> Self {
         let fans = Vec::new();
         Self { fans, bare }

@@ -12,6 +12,7 @@ use glam::DVec3;
 use super::far::Far;
 use super::polygon::Polygons;
 use super::{Mesh, Repairs, gltf, obj, ply, serialized, stl};
+use crate::budget::{Account, Budget};
 use crate::error::{Error, Location, Problem, Result};
 use crate::file;
 
@@ -113,19 +114,29 @@ pub const FORMATS: &[Format] = &[
     },
 ];
 
-/// Reads the mesh in the file `path`, whose extension says the format.
+/// Reads the mesh in the file `path`, whose extension says the format. The budget is asked for all that this takes, and
+/// the mesh stays charged to it, with normals for all of its vertices.
 ///
 /// # Errors
-/// Where the file cannot be opened, has an unknown extension or is malformed; the message says where.
-pub fn read(path: &Path, options: &ReadOptions) -> Result<Loaded> {
+/// Where the file cannot be opened, has an unknown extension, is malformed or larger than the budget allows; the message
+/// says where.
+pub fn read(path: &Path, options: &ReadOptions, budget: &Budget) -> Result<Loaded> {
+    let account = budget.open();
+    let loaded = read_on(path, options, &account)?;
+    account.keep(loaded.mesh.room());
+    Ok(loaded)
+}
+
+/// The same, on an account of the caller's.
+pub(super) fn read_on(path: &Path, options: &ReadOptions, account: &Account) -> Result<Loaded> {
     let format = format_of(path)?;
     let decode = |origin| {
-        with_input(path, |input| {
+        with_input(path, account, |input| {
             (format.read)(Input { origin, ..input }, options)
         })
     };
     if format.has_origin {
-        read_near(path, options, decode)
+        read_near(path, options, account, decode)
     } else {
         Ok(decode(DVec3::ZERO)?.finish(path))
     }
@@ -136,6 +147,7 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<Loaded> {
 pub(super) fn read_near(
     path: &Path,
     options: &ReadOptions,
+    account: &Account,
     decode: impl Fn(DVec3) -> Result<Decoded>,
 ) -> Result<Loaded> {
     let mut loaded = decode(DVec3::ZERO)?.finish(path);
@@ -144,6 +156,7 @@ pub(super) fn read_near(
     };
     if options.bare {
         drop(loaded);
+        account.clear();
         let mut decoded = decode(far.origin)?;
         decoded.warnings.push(far.moved());
         return Ok(decoded.finish(path));
@@ -155,30 +168,51 @@ pub(super) fn read_near(
 }
 
 /// Does `work` on what is in the file `path`, inflated where it is compressed.
-pub(super) fn with_input<T>(path: &Path, work: impl FnOnce(Input<'_>) -> Result<T>) -> Result<T> {
+pub(super) fn with_input<T>(
+    path: &Path,
+    account: &Account,
+    work: impl FnOnce(Input<'_>) -> Result<T>,
+) -> Result<T> {
     let Opened { file, length } = open(path)?;
+    let place = Location::of_file(path);
     if !is_compressed(path) {
-        return work(Input {
+        let input = Input {
             path,
             length,
             origin: DVec3::ZERO,
+            account,
             reader: &mut &file,
-        });
+        };
+        return work(input).map_err(|e| e.at(&place));
     }
     let damaged = |e: io::Error| {
         let message = format!("the compressed file is damaged: {e}");
-        Error::input(message).at(&Location::of_file(path))
+        Error::input(message).at(&place)
     };
-    // Read once for its length, against which all lengths in it are checked.
-    let length = io::copy(&mut inflate(&file), &mut io::sink()).map_err(damaged)?;
+    // Read once for its length, against which all lengths in it are checked. No mesh takes less than this part of it.
+    const LEAST: u64 = 16;
+    let mut inflated = inflate(&file);
+    let (mut buffer, mut length, mut covered) = (vec![0; 1 << 16], 0, 0);
+    loop {
+        match inflated.read(&mut buffer) {
+            Ok(0) => break,
+            Ok(count) => length += count as u64,
+            Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
+            Err(e) => return Err(damaged(e)),
+        }
+        (account.cover(&mut covered, length / LEAST)).map_err(|e| e.at(&place))?;
+    }
+    account.clear();
     let rewound = (&file).rewind();
     rewound.map_err(|e| Error::system("read", path, &e))?;
-    work(Input {
+    let input = Input {
         path,
         length,
         origin: DVec3::ZERO,
+        account,
         reader: &mut inflate(&file),
-    })
+    };
+    work(input).map_err(|e| e.at(&place))
 }
 
 /// What is in a mesh file, inflated where it is compressed.
@@ -266,12 +300,15 @@ pub(super) struct Input<'a> {
     pub(super) length: u64,
     /// What is subtracted from every position, before it is rounded.
     pub(super) origin: DVec3,
+    /// Who is asked for memory.
+    pub(super) account: &'a Account,
     pub(super) reader: &'a mut (dyn Read + Send),
 }
 
 impl Input<'_> {
     /// The whole file.
     pub(super) fn bytes(self) -> Result<Vec<u8>> {
+        self.account.take(self.length)?;
         let mut bytes = Vec::with_capacity(usize::try_from(self.length).unwrap_or(0));
         // A file that grows meanwhile is read as long as it was.
         let read = self.reader.take(self.length).read_to_end(&mut bytes);
@@ -353,12 +390,14 @@ pub(super) mod testing {
     ) -> Result<Loaded> {
         let path = Path::new(name);
         let format = format_of(path)?;
-        read_near(path, options, |origin| {
+        let account = Budget::default().open();
+        read_near(path, options, &account, |origin| {
             let mut reader = bytes;
             let input = Input {
                 path,
                 length: bytes.len() as u64,
                 origin,
+                account: &account,
                 reader: &mut reader,
             };
             (format.read)(input, options)

@@ -10,6 +10,7 @@ use glam::{DVec3, Vec2, Vec3};
 
 use super::read::{Decoded, Input, ReadOptions};
 use super::{Attribute, Mesh, Per};
+use crate::budget::Account;
 use crate::error::{Error, Location, Result};
 
 const MAGIC: u16 = 0x041c;
@@ -23,9 +24,9 @@ const MOST_INFLATED: u64 = 1032;
 
 pub(super) fn read(input: Input<'_>, options: &ReadOptions) -> Result<Decoded> {
     let place = Location::of_file(input.path);
-    let origin = input.origin;
+    let (origin, account) = (input.origin, input.account);
     let bytes = input.bytes()?;
-    let mesh = read_shape(&bytes, options.shape_index, origin).map_err(|message| {
+    let mesh = read_shape(&bytes, options.shape_index, origin, account).map_err(|message| {
         let error = Error::input(message).at(&place);
         match bytes.first_chunk::<2>().map(|&b| u16::from_le_bytes(b)) {
             Some(MAGIC) => error,
@@ -45,21 +46,21 @@ pub(super) fn read(input: Input<'_>, options: &ReadOptions) -> Result<Decoded> {
 /// All meshes of the file, in its order.
 pub(super) fn read_all(input: Input<'_>) -> Result<Vec<Mesh>> {
     let place = Location::of_file(input.path);
-    let origin = input.origin;
+    let (origin, account) = (input.origin, input.account);
     let bytes = input.bytes()?;
     let located = |message| Error::input(message).at(&place);
     // Of a broken file the first says what is wrong; each takes four bytes of the table at least.
     let said = bytes.last_chunk().map_or(1, |&n| u32::from_le_bytes(n));
     let most = u32::try_from(bytes.len() / 4).unwrap_or(u32::MAX);
     (0..said.clamp(1, most.max(1)) as usize)
-        .map(|index| read_shape(&bytes, index, origin).map_err(located))
+        .map(|index| read_shape(&bytes, index, origin, account).map_err(located))
         .collect()
 }
 
 /// What is read, or what is wrong, in words.
 type OrWhy<T> = std::result::Result<T, String>;
 
-fn read_shape(bytes: &[u8], index: usize, origin: DVec3) -> OrWhy<Mesh> {
+fn read_shape(bytes: &[u8], index: usize, origin: DVec3, account: &Account) -> OrWhy<Mesh> {
     let version = version(bytes).ok_or("the file is no serialized mesh")?;
     let stream = shape(bytes, version, index)?;
     if self::version(stream) != Some(version) {
@@ -73,7 +74,7 @@ fn read_shape(bytes: &[u8], index: usize, origin: DVec3) -> OrWhy<Mesh> {
         inflated: ZlibDecoder::new(stream),
         double: false,
     };
-    stream.mesh(version, origin)
+    stream.mesh(version, origin, account)
 }
 
 /// The version after the magic number, if it is one that is known.
@@ -121,7 +122,7 @@ struct Stream<'a> {
 }
 
 impl Stream<'_> {
-    fn mesh(&mut self, version: u16, origin: DVec3) -> OrWhy<Mesh> {
+    fn mesh(&mut self, version: u16, origin: DVec3, account: &Account) -> OrWhy<Mesh> {
         let flags = u32::from_le_bytes(self.array()?);
         self.double = flags & DOUBLE != 0;
         if version == 4 {
@@ -142,6 +143,11 @@ impl Stream<'_> {
                 "{vertices} vertices and {triangles} triangles are promised, more than the file can hold"
             ));
         }
+        // Lists that grow are up to twice as long as what is in them.
+        let numbers = (numbers + 3) * size_of::<f32>() as u64;
+        let bytes = (vertices.saturating_mul(numbers)).saturating_add(triangles.saturating_mul(12));
+        let taken = account.take(bytes.saturating_mul(2));
+        taken.map_err(|e| e.to_string())?;
         let vertices = vertices as usize;
         let mut mesh = Mesh {
             positions: self

@@ -6,6 +6,7 @@ use std::io::{ErrorKind, Read};
 use std::path::Path;
 
 use super::read::Input;
+use crate::budget::Account;
 use crate::error::{Error, Location, Result};
 use crate::file::text;
 
@@ -19,6 +20,8 @@ const LONGEST_WORD: usize = 1 << 10;
 pub(super) struct Source<'a> {
     path: &'a Path,
     reader: &'a mut (dyn Read + Send),
+    /// Who is asked for memory.
+    pub(super) account: &'a Account,
     /// Bytes that `reader` has yet to give.
     ahead: u64,
     buffer: Vec<u8>,
@@ -37,6 +40,7 @@ impl<'a> Source<'a> {
         Self {
             path: input.path,
             reader: input.reader,
+            account: input.account,
             ahead: input.length,
             buffer: Vec::new(),
             used: 0,
@@ -61,6 +65,8 @@ impl<'a> Source<'a> {
 
     /// Reads on until `wanted` bytes are there, or the file ends.
     fn fill(&mut self, wanted: usize) -> Result<()> {
+        // A signal ends reading here.
+        self.account.take(0)?;
         self.buffer.copy_within(self.used..self.filled, 0);
         self.filled -= self.used;
         self.used = 0;
@@ -192,6 +198,7 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
+    use crate::budget::Budget;
 
     #[test]
     fn words_and_bytes_are_the_same_however_the_buffer_cuts_them() {
@@ -200,10 +207,12 @@ mod tests {
         let mut reader = text.as_bytes();
         let path = Path::new("numbers");
         let length = text.len() as u64;
+        let account = Budget::default().open();
         let mut source = Source::new(Input {
             path,
             length,
             origin: DVec3::ZERO,
+            account: &account,
             reader: &mut reader,
         });
         for i in 0..count {
@@ -217,10 +226,12 @@ mod tests {
     #[test]
     fn a_word_that_is_no_number_is_shown_with_its_line() {
         let mut reader = &b"1 2\n3 four"[..];
+        let account = Budget::default().open();
         let input = Input {
             path: Path::new("numbers"),
             length: 10,
             origin: DVec3::ZERO,
+            account: &account,
             reader: &mut reader,
         };
         let mut source = Source::new(input);

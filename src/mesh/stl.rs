@@ -10,6 +10,7 @@ use glam::{DVec3, Vec3};
 
 use super::Mesh;
 use super::read::{Decoded, Input, ReadOptions};
+use crate::budget::Account;
 use crate::error::{Error, Location, Result};
 use crate::file::text;
 
@@ -21,14 +22,17 @@ const ATTRIBUTES: usize = 48;
 
 pub(super) fn read(input: Input<'_>, _options: &ReadOptions) -> Result<Decoded> {
     let path = input.path;
-    let origin = input.origin;
+    let (origin, account) = (input.origin, input.account);
     let bytes = input.bytes()?;
     let count = bytes.get(HEADER - 4..).and_then(|b| b.first_chunk());
     let count = count.map(|&b| u32::from_le_bytes(b) as u64);
     let promised = count.map(|n| HEADER as u64 + n * ROW as u64);
     let mut builder = Builder {
+        mesh: Mesh::default(),
         origin,
-        ..Builder::default()
+        vertices: HashMap::new(),
+        account,
+        covered: 0,
     };
     let mut warnings = Vec::new();
     let first = text::without_mark(&bytes).trim_ascii_start();
@@ -66,7 +70,7 @@ pub(super) fn read(input: Input<'_>, _options: &ReadOptions) -> Result<Decoded> 
                 "{colored} triangles have attribute bytes, which some programs take for colours: they are left out"
             ));
         }
-        builder.read_binary(rows);
+        builder.read_binary(rows)?;
     }
     Ok(Decoded {
         mesh: builder.mesh,
@@ -75,17 +79,20 @@ pub(super) fn read(input: Input<'_>, _options: &ReadOptions) -> Result<Decoded> 
     })
 }
 
-#[derive(Default)]
-struct Builder {
+struct Builder<'a> {
     mesh: Mesh,
     /// What is subtracted from positions.
     origin: DVec3,
     /// The vertex at a place.
     vertices: HashMap<[u32; 3], u32>,
+    /// Who is asked for memory, and what was taken.
+    account: &'a Account,
+    covered: u64,
 }
 
-impl Builder {
-    fn read_binary(&mut self, rows: &[u8]) {
+impl Builder<'_> {
+    fn read_binary(&mut self, rows: &[u8]) -> Result<()> {
+        self.account.take_rows((rows.len() / ROW) as u64, 12)?;
         self.mesh.triangles.reserve_exact(rows.len() / ROW);
         for row in rows.chunks_exact(ROW) {
             let number = |at: usize| {
@@ -93,8 +100,9 @@ impl Builder {
             };
             let corner = |at: usize| Vec3::new(number(at), number(at + 4), number(at + 8));
             let place = |at: usize| (corner(at).as_dvec3() - self.origin).as_vec3();
-            self.push([12, 24, 36].map(place));
+            self.push([12, 24, 36].map(place))?;
         }
+        Ok(())
     }
 
     /// `vertex x y z`, three times a facet; the words between, in upper or lower case, say nothing more.
@@ -121,7 +129,7 @@ impl Builder {
                 Some(b"endloop" | b"endfacet" | b"end" | b"outer" | b"facet") => {
                     match corners[..] {
                         [] => {}
-                        [a, b, c] => self.push([a, b, c]),
+                        [a, b, c] => self.push([a, b, c])?,
                         _ => return Err(wrong("a facet has three vertices, and this one has not")),
                     }
                     corners.clear();
@@ -140,7 +148,17 @@ impl Builder {
         }
     }
 
-    fn push(&mut self, corners: [Vec3; 3]) {
+    fn push(&mut self, corners: [Vec3; 3]) -> Result<()> {
+        /// Triangles between two askings, and bytes of a vertex: in its list, in the table, and with a normal.
+        const OFTEN: usize = 1 << 12;
+        const VERTEX: usize = 84;
+        let count = self.mesh.triangles.len();
+        if count.is_multiple_of(OFTEN) {
+            // Each triangle may have vertices of its own.
+            let vertices = self.mesh.positions.len() + 3 * OFTEN;
+            let bytes = self.mesh.triangles.capacity().max(count + OFTEN) * 12 + vertices * VERTEX;
+            self.account.cover(&mut self.covered, bytes as u64)?;
+        }
         let triangle = corners.map(|corner| {
             // −0 and 0 are one place.
             let key = (corner + 0.0).to_array().map(f32::to_bits);
@@ -152,5 +170,6 @@ impl Builder {
             })
         });
         self.mesh.triangles.push(triangle);
+        Ok(())
     }
 }

@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 
 use super::read::testing::decode;
 use super::*;
+use crate::budget::Budget;
 
 /// The shared data, or `None` (said on stderr) where it is absent.
 #[expect(clippy::print_stderr, reason = "a skipped test says so")]
@@ -37,7 +38,7 @@ fn files_below(folder: &Path) -> Vec<PathBuf> {
 }
 
 fn load(path: &Path) -> Loaded {
-    read(path, &ReadOptions::default()).unwrap_or_else(|e| panic!("{e}"))
+    read(path, &ReadOptions::default(), &Budget::default()).unwrap_or_else(|e| panic!("{e}"))
 }
 
 #[test]
@@ -437,7 +438,7 @@ fn compressed_files_hold_what_the_others_do_and_damaged_ones_are_refused() {
         let read_from = |name: &str, bytes: &[u8]| {
             let path = folder.path().join(name);
             std::fs::write(&path, bytes).unwrap();
-            read(&path, &ReadOptions::default()).map(|loaded| loaded.mesh)
+            read(&path, &ReadOptions::default(), &Budget::default()).map(|loaded| loaded.mesh)
         };
         let mut gzip = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
         gzip.write_all(&bytes).unwrap();
@@ -877,9 +878,13 @@ fn malformed_files_are_refused_with_what_is_wrong_and_where() {
 fn folders_missing_files_and_unknown_formats_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let message = |name: &str| {
-        read(&folder.path().join(name), &ReadOptions::default())
-            .unwrap_err()
-            .to_string()
+        read(
+            &folder.path().join(name),
+            &ReadOptions::default(),
+            &Budget::default(),
+        )
+        .unwrap_err()
+        .to_string()
     };
     std::fs::create_dir(folder.path().join("folder.ply")).unwrap();
     assert!(message("folder.ply").ends_with("a mesh file is wanted here, and this is a folder"));
@@ -907,7 +912,7 @@ fn gltf_parts_keep_name_color_and_camera() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("cube.gltf");
     std::fs::write(&path, gltf_text(&cube())).unwrap();
-    let scene = read_gltf(&path, &ReadOptions::default()).unwrap();
+    let scene = read_gltf(&path, &ReadOptions::default(), &Budget::default().open()).unwrap();
     let names: Vec<_> = scene.parts.iter().map(|p| p.name.as_str()).collect();
     assert_eq!(names, ["", "box"]);
     assert_eq!(scene.parts[0].base_color, [0.5, 0.25, 1.0, 1.0]);
@@ -1029,14 +1034,19 @@ fn every_format_converts_to_what_it_reads_as() {
             folder.path().join("out.ply"),
         );
         std::fs::write(&source, &sample.bytes).unwrap();
-        let read = read_parts(&source).unwrap();
+        let read = read_parts(&source, &Budget::default()).unwrap();
         if sample.name.ends_with("serialized") {
             for (shape_index, part) in read.parts.iter().enumerate() {
                 let options = ReadOptions {
                     shape_index,
                     ..ReadOptions::default()
                 };
-                assert_eq!(part.mesh, super::read(&source, &options).unwrap().mesh);
+                assert_eq!(
+                    part.mesh,
+                    super::read(&source, &options, &Budget::default())
+                        .unwrap()
+                        .mesh
+                );
             }
             assert_eq!(read.parts.len(), 2);
             continue;

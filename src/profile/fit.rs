@@ -1,7 +1,7 @@
 //! How a quantity grows: a power law y = a·xᵇ, a logarithm y = a + b·log₂ x or a line y = a + b·x, by least
 //! squares in log space for the first and on relative errors for the others. Intervals of b are percentiles of a
 //! bootstrap over points and repetitions (Efron, *Bootstrap methods: another look at the jackknife*, 1979) with a
-//! fixed seed, so that the same measurements have the same intervals. A model is judged by what it foretells of
+//! fixed seed, so that the same measurements have the same intervals. A model is judged by what it predicts of
 //! the largest x from all others.
 
 use rand::RngExt;
@@ -41,7 +41,7 @@ pub struct Fit {
     pub b: f64,
     /// Holds b in 95 of 100 cases.
     pub interval: [f64; 2],
-    /// How far off the largest x is foretold from all others, in parts of what was observed there; absent
+    /// How far off the largest x is predicted from all others, in parts of what was observed there; absent
     /// with fewer than four points.
     pub held_out: Option<f64>,
 }

@@ -26,10 +26,13 @@ impl Profile {
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
 <title>Profile of {subject}</title><link rel="icon" href="data:,"><style>{STYLE}</style></head><body>
 <h1>What it costs as it grows: {subject}</h1>
-<p>Étendue {version}; {rounds} rounds over {renders} renders in {seconds:.0} s. The textbook: O(P·O·L) by brute
-force, × N/3 for N bands, and log O for a tree. Counts are the same on every machine; times are medians, with
-intervals that hold them in 95 of 100 cases.</p>
+<p><strong>{answer}</strong></p>
+<p>Étendue {version} on {machine}; {rounds} rounds over {renders} renders in {seconds:.0} s. The textbook says
+O(P·O·L) by brute force, × N/3 for N bands, and log O for a tree: P pixels, O triangles, L lights. Counts are the same
+on every machine; times are medians, with intervals that hold them in 95 of 100 cases.</p>
 "#,
+            answer = escaped(&self.answer().unwrap_or_default()),
+            machine = escaped(&self.machine),
             subject = escaped(&self.subject),
             version = escaped(&self.version),
             rounds = self.rounds,
@@ -67,7 +70,7 @@ intervals that hold them in 95 of 100 cases.</p>
     }
 
     fn verdict_table(&self, page: &mut String) {
-        *page += "<h2>Verdicts</h2>\n<div class=\"wide\"><table class=\"words\"><tr><th>what</th><th>foretold</th>\
+        *page += "<h2>Verdicts</h2>\n<div class=\"wide\"><table class=\"words\"><tr><th>what</th><th>predicted</th>\
                   <th>measured</th><th>verdict</th></tr>\n";
         for verdict in &self.verdicts {
             let class = match verdict.outcome {

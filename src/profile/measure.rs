@@ -6,11 +6,13 @@ use std::num::NonZeroUsize;
 use std::time::Instant;
 
 use super::axis::{Axis, Effort};
+use super::machine;
 use super::noise::Loops;
 use super::subject::{Stage, Subject};
 use super::sweep::{Extent, Setting, Sweep};
 use super::{FORMAT, Fit, Growth, Point, Profile, Series, scaling, verdict};
 use crate::accel::Build;
+use crate::budget::Budget;
 use crate::error::{Error, Result};
 use crate::render::{Colors, Options, Overrides, Report, Seconds, Session, Silent};
 
@@ -32,7 +34,7 @@ pub struct Settings {
     /// Which of a scene's sensors, by id or number; the first where absent.
     pub sensor: Option<String>,
     /// The most bytes that a render may take.
-    pub memory_limit: Option<u64>,
+    pub budget: Budget,
 }
 
 /// Somebody who watches a run.
@@ -147,6 +149,7 @@ pub fn run(settings: &Settings, watch: &dyn Watch) -> Result<Option<Profile>> {
         format: FORMAT,
         version: env!("CARGO_PKG_VERSION").to_owned(),
         subject: settings.subject.name(),
+        machine: machine::name(),
         effort: settings.effort,
         rounds: complete,
         seconds: begin.elapsed().as_secs_f64(),
@@ -162,7 +165,7 @@ pub fn run(settings: &Settings, watch: &dyn Watch) -> Result<Option<Profile>> {
 
 /// The most triangles that fit into memory.
 fn most_triangles(settings: &Settings, notes: &mut Vec<String>) -> u32 {
-    let limit = settings.memory_limit;
+    let limit = settings.budget.limit();
     let fit = limit.map_or(u64::MAX, |bytes| bytes / BYTES_A_TRIANGLE);
     if fit < settings.effort.largest().into() {
         notes.push(format!(
@@ -266,7 +269,7 @@ impl Rounds<'_> {
     /// A render's turn.
     fn measure(&mut self, sweep: usize, index: usize) -> Result<()> {
         let setting = &self.sweeps[sweep].settings[index];
-        let description = self.stage.describe(setting)?;
+        let description = self.stage.describe(setting)?.within(&self.settings.budget);
         let options = self.options(setting);
         if self.sweeps[sweep].fresh {
             self.session = Session::default();
@@ -309,7 +312,6 @@ impl Rounds<'_> {
             method: setting.method,
             // The same for all, whatever the rays that are to come.
             build: Some(Build::Medium),
-            memory_limit: self.settings.memory_limit,
             sensor: self.stage.sensor(),
             ..Options::default()
         }

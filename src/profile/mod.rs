@@ -6,6 +6,7 @@
 
 mod axis;
 mod fit;
+mod machine;
 mod measure;
 mod noise;
 mod quantity;
@@ -15,6 +16,7 @@ mod subject;
 mod sweep;
 mod verdict;
 
+mod answer;
 mod chart;
 mod compare;
 mod csv;
@@ -50,6 +52,9 @@ pub struct Profile {
     pub version: String,
     /// What was rendered.
     pub subject: String,
+    /// The machine, in words; profiles of older versions have none.
+    #[serde(default)]
+    pub machine: String,
     /// How much was taken on.
     pub effort: Effort,
     /// Rounds over all renders.

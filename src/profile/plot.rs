@@ -188,7 +188,7 @@ pub(super) fn law(axis: Axis, fit: &Fit) -> String {
         Model::Line => format!("{} + {}·{axis}", scientific(*a), scientific(*b)),
     };
     match held_out {
-        Some(off) => format!("{law}; largest foretold to {:+.1} %", 100.0 * off),
+        Some(off) => format!("{law}; largest predicted to {:+.1} %", 100.0 * off),
         None => law,
     }
 }

@@ -1,12 +1,13 @@
 //! A mesh in more triangles or fewer, and as a file.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
-use crate::math::random;
+use glam::DVec3;
+
 use crate::mesh::Mesh;
 
-/// About so many triangles of a mesh: some of them, drawn evenly, so that smaller parts lie within larger ones;
-/// or all, each cut in four as often as it takes.
+/// A mesh of about so many triangles that covers what this one covers: vertices that lie together become one, or each
+/// triangle is cut in four as often as it takes.
 pub(super) fn resized(mesh: &Mesh, triangles: u32) -> Mesh {
     let own = mesh.triangles.len();
     let wanted = (triangles as usize).max(1);
@@ -16,28 +17,84 @@ pub(super) fn resized(mesh: &Mesh, triangles: u32) -> Mesh {
         ..Mesh::default()
     };
     if wanted < own {
-        let mut order: Vec<u32> = (0..own as u32).collect();
-        order.sort_unstable_by_key(|i| random::key(0, u64::from(*i)));
-        order.truncate(wanted);
-        order.sort_unstable();
-        let mut numbers = HashMap::new();
-        let mut positions = Vec::new();
-        let chosen = order.iter().map(|i| {
-            mesh.triangles[*i as usize].map(|corner| {
-                *numbers.entry(corner).or_insert_with(|| {
-                    positions.push(mesh.positions[corner as usize]);
-                    positions.len() as u32 - 1
-                })
-            })
-        });
-        let chosen = chosen.collect();
-        return bare(positions, chosen);
+        return coarser(mesh, wanted);
     }
     let mut finer = bare(mesh.positions.clone(), mesh.triangles.clone());
     while finer.triangles.len() * 2 < wanted {
         finer = in_four(&finer);
     }
     finer
+}
+
+/// The mesh with vertices joined that lie in one cell of a grid, whose cells are as large as leaves most triangles that
+/// are no more than `wanted`.
+fn coarser(mesh: &Mesh, wanted: usize) -> Mesh {
+    /// Cells along the box's longest side.
+    const MOST: u32 = 1 << 16;
+    let (mut few, mut many) = (1, MOST);
+    let mut best = clustered(mesh, few);
+    while few + 1 < many {
+        // Triangles grow with the square of the cells.
+        let ratio = (wanted as f64 / best.triangles.len().max(1) as f64)
+            .sqrt()
+            .clamp(1.01, 4.0);
+        let guess = ((f64::from(few) * ratio) as u32).clamp(few + 1, many - 1);
+        let middle = if many == MOST {
+            guess
+        } else {
+            few.midpoint(many)
+        };
+        let mesh = clustered(mesh, middle);
+        if mesh.triangles.len() <= wanted {
+            (few, best) = (middle, mesh);
+        } else {
+            many = middle;
+        }
+    }
+    if best.triangles.is_empty() {
+        return clustered(mesh, many);
+    }
+    best
+}
+
+/// The mesh with one vertex in each cell of a grid of so many cells along the longest side: the mean of those that were
+/// in it. Triangles that lose their area, and those that are there already, are left out.
+fn clustered(mesh: &Mesh, cells: u32) -> Mesh {
+    let (low, high) = mesh.bounds().unwrap_or_default();
+    let cell = ((high - low).max_element() / cells as f32).max(f32::MIN_POSITIVE);
+    let mut numbers: HashMap<[u32; 3], u32> = HashMap::new();
+    let mut sums: Vec<(DVec3, u32)> = Vec::new();
+    let joined = mesh.positions.iter().map(|position| {
+        let place = ((*position - low) / cell).to_array().map(|x| x as u32);
+        let number = *numbers.entry(place).or_insert_with(|| {
+            sums.push((DVec3::ZERO, 0));
+            sums.len() as u32 - 1
+        });
+        let (sum, count) = &mut sums[number as usize];
+        *sum += position.as_dvec3();
+        *count += 1;
+        number
+    });
+    let joined: Vec<u32> = joined.collect();
+    let mut seen = HashSet::new();
+    let triangles = mesh
+        .triangles
+        .iter()
+        .map(|t| t.map(|corner| joined[corner as usize]));
+    let triangles = triangles.filter(|&[a, b, c]| {
+        let mut sorted = [a, b, c];
+        sorted.sort_unstable();
+        a != b && b != c && c != a && seen.insert(sorted)
+    });
+    let triangles = triangles.collect();
+    let means = sums
+        .iter()
+        .map(|(sum, count)| (*sum / f64::from(*count)).as_vec3());
+    Mesh {
+        triangles,
+        positions: means.collect(),
+        ..Mesh::default()
+    }
 }
 
 /// Each triangle cut in four through the middles of its edges.
@@ -85,23 +142,34 @@ pub(super) fn ply(mesh: &Mesh) -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::budget::Budget;
     use std::fs;
-
-    use glam::Vec3;
 
     use crate::mesh::{ReadOptions, bumpy_sphere, read, terrain};
 
     #[test]
-    fn meshes_come_in_nested_parts_and_in_finer_cuts_of_the_same_surface() {
+    fn meshes_come_coarser_and_finer_and_cover_what_they_covered() {
+        let mesh = bumpy_sphere(5, 1);
+        let own = mesh.triangles.len() as u32;
+        for part in [4, 16, 64] {
+            let small = resized(&mesh, own / part);
+            let count = small.triangles.len() as u32;
+            assert!(
+                count <= own / part && count > own / part / 2,
+                "{part}: {count} of {own}"
+            );
+            let (low, high) = small.bounds().unwrap();
+            let (low_of_all, high_of_all) = mesh.bounds().unwrap();
+            assert!(low.distance(low_of_all) < 0.4 && high.distance(high_of_all) < 0.4);
+            assert!(
+                (small.area() / mesh.area() - 1.0).abs() < 0.35,
+                "{part}: {}",
+                small.area()
+            );
+        }
+        assert!((1..50).contains(&resized(&mesh, 1).triangles.len()));
         let mesh = bumpy_sphere(3, 1);
         let own = mesh.triangles.len() as u32;
-        let [small, large] = [resized(&mesh, own / 8), resized(&mesh, own / 2)];
-        assert_eq!(small.triangles.len() as u32, own / 8);
-        let corners = |mesh: &Mesh| -> Vec<[Vec3; 3]> {
-            mesh.triangles.iter().map(|t| mesh.corners(t)).collect()
-        };
-        let larger = corners(&large);
-        assert!(corners(&small).iter().all(|t| larger.contains(t)));
         let finer = resized(&mesh, 16 * own);
         assert_eq!(finer.triangles.len() as u32, 16 * own);
         assert!((finer.area() / mesh.area() - 1.0).abs() < 1e-5);
@@ -116,7 +184,9 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.ply");
         fs::write(&path, ply(&mesh)).unwrap();
-        let again = read(&path, &ReadOptions::default()).unwrap().mesh;
+        let again = read(&path, &ReadOptions::default(), &Budget::default())
+            .unwrap()
+            .mesh;
         assert_eq!(
             (again.positions, again.triangles),
             (mesh.positions, mesh.triangles)

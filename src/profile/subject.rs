@@ -104,7 +104,7 @@ impl Stage {
         let Settings {
             subject,
             overrides,
-            memory_limit,
+            budget,
             ..
         } = settings;
         let folder = tempfile::tempdir()
@@ -112,7 +112,7 @@ impl Stage {
         let source = match subject {
             Subject::Terrain => Source::Terrain,
             Subject::Mesh { path, up } => {
-                let mesh = read(path, &ReadOptions::BARE)?.mesh;
+                let mesh = read(path, &ReadOptions::BARE, budget)?.mesh;
                 if mesh.triangles.is_empty() {
                     return Err(Error::input(format!(
                         "{} holds no triangle",
@@ -125,14 +125,13 @@ impl Stage {
                 }
             }
             Subject::Scene { path, options } => {
-                let mut description = Description::read(path, options)?;
+                let mut description = Description::read(path, options, budget)?;
                 let sensor = match &settings.sensor {
                     Some(name) => find_sensor(&description, name)?,
                     None => 0,
                 };
                 overrides.apply(&mut description);
                 let run = Options {
-                    memory_limit: *memory_limit,
                     sensor,
                     ..Options::default()
                 };

@@ -4,6 +4,7 @@ use std::num::NonZeroUsize;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::*;
+use crate::budget::Budget;
 use crate::description;
 use crate::render::{Overrides, UpAxis};
 
@@ -34,7 +35,7 @@ fn settings(axes: &[Axis]) -> Settings {
         rounds: Some(2),
         overrides: Overrides::default(),
         sensor: None,
-        memory_limit: None,
+        budget: Budget::default(),
     }
 }
 

@@ -1,13 +1,13 @@
-//! The textbook's loops, one at a time: what it foretells, what was measured, and whether that confirms it.
+//! The textbook's loops, one at a time: what it predicts, what was measured, and whether that confirms it.
 //! Counts are judged always; times only where the machine was calm enough to tell.
 
 use serde::{Deserialize, Serialize};
 
 use super::{Axis, Fit, Model, Noise, Point, Quantity, Series, Way};
 
-/// How far an exponent may be from the foretold one.
+/// How far an exponent may be from the predicted one.
 const TOLERANCE: f64 = 0.05;
-/// How far off the largest size may be foretold.
+/// How far off the prediction of the largest size may be.
 const FORETOLD: f64 = 0.05;
 
 /// What became of a prediction.
@@ -38,7 +38,7 @@ impl Outcome {
 pub struct Verdict {
     /// Whose it is: pixel loop, object loop, …
     pub subject: String,
-    /// What is foretold.
+    /// What is predicted.
     pub predicted: String,
     /// What was measured.
     pub measured: String,
@@ -217,7 +217,7 @@ impl Judge<'_> {
         }
     }
 
-    /// The tree: a logarithm foretells the largest size, and better than a power law does.
+    /// The tree: a logarithm predicts the largest size, and better than a power law does.
     fn logarithm(&self) -> Option<Verdict> {
         let tree = self.along(Axis::Objects, Way::Tree)?;
         let of = |model| tree.growth(Quantity::StepsPerRay, model).map(|g| g.fit);
@@ -227,7 +227,7 @@ impl Judge<'_> {
             subject: "object loop, tree".to_owned(),
             predicted: "node steps a ray = a + b·log₂ O".to_owned(),
             measured: format!(
-                "{:.2} + {:.3}·log₂ O; largest size foretold to {:+.1} % (power law {:+.1} %)",
+                "{:.2} + {:.3}·log₂ O; largest size predicted to {:+.1} % (power law {:+.1} %)",
                 logarithm.a,
                 logarithm.b,
                 100.0 * by_logarithm,

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use glam::{DMat4, DVec3, Vec3};
 
+use crate::budget::Budget;
 use crate::description::{Description, Options};
 use crate::error::{Error, Location, Result};
 use crate::mesh::{
@@ -69,8 +70,13 @@ pub struct BareMesh {
     pub mesh: ReadMesh,
 }
 
-/// A scene around the mesh in `path`.
-pub fn describe_mesh(path: &Path, up: UpAxis, options: &Options) -> Result<BareMesh> {
+/// A scene around the mesh in `path`, which is read within the budget.
+pub fn describe_mesh(
+    path: &Path,
+    up: UpAxis,
+    options: &Options,
+    budget: &Budget,
+) -> Result<BareMesh> {
     let Some(plugin) = plugin(path) else {
         return Err(Error::input(format!(
             "{} is no mesh that Étendue reads",
@@ -78,7 +84,7 @@ pub fn describe_mesh(path: &Path, up: UpAxis, options: &Options) -> Result<BareM
         )));
     };
     let read_options = ReadOptions::BARE;
-    let mut loaded = read(path, &read_options)?;
+    let mut loaded = read(path, &read_options, budget)?;
     let Some(bounds) = loaded.mesh.bounds() else {
         return Err(Error::input(format!(
             "{} holds no triangle",
@@ -95,7 +101,7 @@ pub fn describe_mesh(path: &Path, up: UpAxis, options: &Options) -> Result<BareM
     }
     let up = up.direction();
     let camera = match plugin {
-        "gltf" => read_gltf_camera(path)?,
+        "gltf" => read_gltf_camera(path, budget)?,
         _ => None,
     };
     let text = scene(&Subject {
@@ -111,7 +117,7 @@ pub fn describe_mesh(path: &Path, up: UpAxis, options: &Options) -> Result<BareM
         strict: false,
         ..options.clone()
     };
-    let description = Description::parse(&text, path, &options)?;
+    let description = Description::parse(&text, path, &options)?.within(budget);
     let file = MeshFile {
         path: path.to_owned(),
         options: read_options,
@@ -298,7 +304,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join(name);
         std::fs::write(&path, text).unwrap();
-        let bare = describe_mesh(&path, UpAxis::Y, &Options::default());
+        let bare = describe_mesh(&path, UpAxis::Y, &Options::default(), &Budget::default());
         bare.unwrap().description
     }
 
@@ -354,7 +360,7 @@ mod tests {
         let obj = "mtllib red.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\n";
         std::fs::write(&path, obj).unwrap();
         let textures = || {
-            let bare = describe_mesh(&path, UpAxis::Y, &Options::default());
+            let bare = describe_mesh(&path, UpAxis::Y, &Options::default(), &Budget::default());
             let scene = bare.unwrap().description;
             let shape = scene.root().children(Kind::Shape)[2];
             assert!(shape.boolean("bare").unwrap());

@@ -5,6 +5,7 @@
 use std::io::Read;
 use std::path::Path;
 
+use crate::budget::human_bytes;
 use crate::description::{Description, Part};
 use crate::error::{Error, Result};
 use crate::file::text;
@@ -84,7 +85,7 @@ impl Estimate {
         estimate
     }
 
-    fn total(&self) -> u64 {
+    pub(super) fn total(&self) -> u64 {
         self.film
             .saturating_add(self.assets)
             .saturating_add(self.trees)
@@ -176,19 +177,6 @@ fn ply_counts(path: &Path) -> (u64, u64) {
     counts
 }
 
-/// A number of bytes as people say it: `3.2 GB`.
-pub fn human_bytes(bytes: u64) -> String {
-    let mut value = bytes as f64;
-    for unit in ["B", "kB", "MB", "GB"] {
-        if value < 999.5 {
-            let digits = usize::from(unit != "B" && value < 99.95);
-            return format!("{value:.digits$} {unit}");
-        }
-        value /= 1000.0;
-    }
-    format!("{value:.1} TB")
-}
-
 #[cfg(test)]
 mod tests {
     use std::io::Write;
@@ -246,19 +234,6 @@ mod tests {
             check_mesh(&path, Some(200_000_000)).unwrap();
             let error = check_mesh(&path, Some(10_000_000)).unwrap_err().to_string();
             assert!(error.contains("more than the limit of 10.0 MB"), "{error}");
-        }
-    }
-
-    #[test]
-    fn bytes_are_said_in_three_digits() {
-        for (bytes, said) in [
-            (0, "0 B"),
-            (999, "999 B"),
-            (1000, "1.0 kB"),
-            (123_456_789, "123 MB"),
-            (8_000_000_000, "8.0 GB"),
-        ] {
-            assert_eq!(human_bytes(bytes), said);
         }
     }
 }

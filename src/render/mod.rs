@@ -38,7 +38,7 @@ pub use adaptive::AdaptiveReport;
 pub use bare::{BareMesh, UpAxis, describe_mesh, is_mesh};
 pub use heat::Heat;
 pub use info::{NamedFile, SceneInfo, SensorInfo};
-pub use memory::{check_mesh, human_bytes};
+pub use memory::check_mesh;
 pub use options::{Adaptive, Checkpoint, Colors, Options, Overrides};
 pub(crate) use pinned::pin;
 pub use plan::Completed;

@@ -67,8 +67,6 @@ pub struct Options {
     pub sensor: usize,
     /// Where the render is kept, so that it can be continued after an interruption.
     pub checkpoint: Option<Checkpoint>,
-    /// The most bytes that the render may take, by an estimate made before they are taken.
-    pub memory_limit: Option<u64>,
 }
 
 /// Values in place of the scene's own.

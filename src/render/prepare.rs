@@ -297,9 +297,12 @@ fn make<C: ColorModel>(
         film,
         ..Estimate::of_files(description)
     };
-    announced.check(options.memory_limit)?;
+    let budget = description.budget();
+    announced.check(budget.limit())?;
+    let of_given = given.as_ref().map_or(0, |given| given.loaded.mesh.room());
+    budget.begin(film.saturating_add(of_given));
     let assets = timed(&mut seconds.load, || {
-        let limit = options.memory_limit.map(|limit| limit.saturating_sub(film));
+        let limit = budget.limit().map(|limit| limit.saturating_sub(film));
         load(
             description,
             given,
@@ -325,7 +328,9 @@ fn make<C: ColorModel>(
             Method::Tree => memory::trees(primitives + assets.instance_count()),
         },
     };
-    loaded.check(options.memory_limit)?;
+    loaded.check(budget.limit())?;
+    // What textures take is added to it.
+    budget.begin(loaded.total());
     let scene = timed(&mut seconds.build, || {
         progress.begin(Phase::Build, 1);
         let build = (options.build).unwrap_or_else(|| Build::suited(primitives, rays));
@@ -418,7 +423,7 @@ pub(super) fn prepare<'k, C: ColorModel>(ask: &'k mut Ask<'_>, color: C) -> Resu
         assets,
         trees,
     }
-    .check(options.memory_limit)?;
+    .check(description.budget().limit())?;
     let scene: &Scene<C> = kept
         .scene
         .downcast_ref()

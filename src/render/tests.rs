@@ -8,6 +8,7 @@ use std::time::Duration;
 use glam::Vec3;
 
 use super::*;
+use crate::budget::Budget;
 use crate::description;
 use crate::mesh::read;
 use crate::sensor::Window;
@@ -358,17 +359,15 @@ fn what_does_not_fit_into_memory_is_refused_before_anything_is_loaded() {
     let place = Place::new();
     let watch = Watch::default();
     for (size, limit, part) in [((4000, 4000), 600_000_000, "--crop"), ((8, 8), 4_700, "")] {
-        let mut scene = place.scene(SCENE);
+        let mut scene = place.scene(SCENE).within(&Budget::new(Some(limit)));
         let overrides = Overrides {
             size: Some(size),
             ..Overrides::default()
         };
         overrides.apply(&mut scene);
-        let options = Options {
-            memory_limit: Some(limit),
-            ..Options::default()
-        };
-        let error = render(&scene, &options, &watch).unwrap_err().to_string();
+        let error = render(&scene, &Options::default(), &watch)
+            .unwrap_err()
+            .to_string();
         assert!(error.contains("more than the limit"), "{error}");
         assert!(error.contains(part), "{error}");
         assert_eq!(watch.loaded.load(Ordering::Relaxed), 0);
@@ -422,11 +421,13 @@ fn a_bare_mesh_is_in_the_middle_of_its_turntable() {
     let place = Place::new();
     let path = place.path("floor.ply");
     let options = description::Options::default();
-    let bare = describe_mesh(&path, UpAxis::Y, &options).unwrap();
+    let bare = describe_mesh(&path, UpAxis::Y, &options, &Budget::default()).unwrap();
     let bounds = Session::default()
         .bounds(&bare.description, &Options::default(), &Silent)
         .unwrap();
-    let mesh = read(Path::new(&path), &Default::default()).unwrap().mesh;
+    let mesh = read(Path::new(&path), &Default::default(), &Budget::default())
+        .unwrap()
+        .mesh;
     let (low, high) = mesh.bounds().unwrap();
     let off = 0.5 * (bounds.min + bounds.max) - 0.5 * (low + high);
     assert!(off.x.abs() < 1e-3 && off.z.abs() < 1e-3, "{off}");
@@ -474,7 +475,13 @@ fn a_flat_bare_mesh_is_seen_whichever_way_it_lies() {
                 continue; // the test's own numbers would not keep it
             }
             fs::write(&path, red_square(corner, first, second)).unwrap();
-            let bare = describe_mesh(&path, up, &description::Options::default()).unwrap();
+            let bare = describe_mesh(
+                &path,
+                up,
+                &description::Options::default(),
+                &Budget::default(),
+            )
+            .unwrap();
             let mut description = bare.description;
             let overrides = Overrides {
                 size: Some((40, 30)),
@@ -501,7 +508,12 @@ fn a_bare_mesh_without_an_area_is_refused_in_words() {
         for first in [Vec3::ZERO, Vec3::X] {
             let second = if first == Vec3::ZERO { first } else { second };
             fs::write(&path, red_square(Vec3::ONE, first, second)).unwrap();
-            let refused = describe_mesh(&path, UpAxis::Y, &description::Options::default());
+            let refused = describe_mesh(
+                &path,
+                UpAxis::Y,
+                &description::Options::default(),
+                &Budget::default(),
+            );
             let message = refused.unwrap_err().to_string();
             assert!(
                 message.contains("none of the triangles has an area"),
@@ -515,7 +527,13 @@ fn a_bare_mesh_without_an_area_is_refused_in_words() {
 fn a_mesh_that_is_given_is_not_read_again() {
     let place = Place::new();
     let path = place.path("floor.ply");
-    let bare = describe_mesh(&path, UpAxis::Y, &description::Options::default()).unwrap();
+    let bare = describe_mesh(
+        &path,
+        UpAxis::Y,
+        &description::Options::default(),
+        &Budget::default(),
+    )
+    .unwrap();
     let BareMesh { description, mesh } = bare;
     fs::write(&path, "nothing of use").unwrap();
     let mut session = Session::default();

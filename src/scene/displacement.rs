@@ -382,6 +382,11 @@ mod tests {
             ),
             (
                 "rectangle",
+                r#"<float name="displacement" value="1"/><float name="displacement_scale" value="1e38"/>"#,
+                "displacement_scale",
+            ),
+            (
+                "rectangle",
                 r#"<float name="displacement" value="1"/><float name="displacement_edge" value="1e-4"/>"#,
                 "more triangles than the 999998",
             ),

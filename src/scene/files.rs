@@ -80,7 +80,10 @@ impl Task {
             shape
         };
         let loaded = match (self.read, self.file) {
-            (None, Some(file)) if self.sites.len() > 1 => read(&file.path, &file.options).ok(),
+            (None, Some(file)) if self.sites.len() > 1 => {
+                let budget = sites[self.sites[0]].properties.budget();
+                read(&file.path, &file.options, budget).ok()
+            }
             (read, _) => read,
         };
         let Some(loaded) = loaded else {
@@ -102,7 +105,15 @@ impl Task {
             done(site, shape::build_from(loaded, setting, properties))
         };
         let (last, others) = self.sites.split_last().expect("a task has sites");
-        let others = others.par_iter().map(|&site| place(site, loaded.clone()));
+        let copied = |&site: &usize| {
+            let budget = sites[site].properties.budget();
+            let taken = budget.take(loaded.mesh.room());
+            match taken {
+                Ok(()) => place(site, loaded.clone()),
+                Err(error) => done(site, Err(error.at(sites[site].properties.location()))),
+            }
+        };
+        let others = others.par_iter().map(copied);
         let mut shapes: Vec<Result<Shape>> = others.collect();
         shapes.push(place(*last, loaded));
         shapes

@@ -361,6 +361,9 @@ const TO_WORLD: Row = motion("to_world", "from the shape's space to the world");
 const FLIP_NORMALS: Row = boolean("flip_normals", false, "whether the other side is the front");
 const BSDF: Row = nested(Kind::Bsdf, "how it scatters light; diffuse without one");
 
+/// How far a surface may be moved; squares of single precision end at 3.4e38.
+const MOST_DISPLACED: f64 = 1e15;
+
 /// What every shape reads.
 const COMMON: &[Row] = &[
     TO_WORLD,
@@ -385,12 +388,14 @@ const COMMON: &[Row] = &[
         1.0,
         "what displacement is multiplied by",
     )
+    .between(-MOST_DISPLACED, MOST_DISPLACED)
     .own(),
     float(
         "displacement_offset",
         0.0,
         "what is added to that; scene units",
     )
+    .between(-MOST_DISPLACED, MOST_DISPLACED)
     .own(),
     float(
         "displacement_edge",
@@ -500,7 +505,7 @@ pub fn build_within(setting: &Setting<'_>, properties: &Properties<'_>) -> Resul
         Some(Build::Made(build)) => build(properties, &setting.outer),
         Some(Build::Read(options)) => {
             let file = mesh::file(properties, options(properties)?)?;
-            let loaded = read(&file.path, &file.options);
+            let loaded = read(&file.path, &file.options, properties.budget());
             let loaded = loaded.map_err(|e| e.named_at(properties.location()))?;
             from_file(loaded, properties, setting)
         }
@@ -545,7 +550,7 @@ fn from_file(loaded: Loaded, properties: &Properties<'_>, setting: &Setting<'_>)
             path: properties.file(&name)?,
             ..mesh::file(properties, options(properties)?)?
         };
-        let loaded = read(&file.path, &file.options);
+        let loaded = read(&file.path, &file.options, properties.budget());
         let loaded = loaded.map_err(|e| e.named_at(properties.location()))?;
         shapes.push(mesh::place_file(loaded, properties, setting)?);
     }

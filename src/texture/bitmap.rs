@@ -7,6 +7,7 @@ use std::sync::Arc;
 use glam::{Mat3, Vec2};
 
 use super::{Palette, Pattern, Picture, to_uv, transformed};
+use crate::budget::Budget;
 use crate::color::{ColorModel, Role, Spectra, Spectral};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, boolean, choice, file, string};
@@ -119,7 +120,8 @@ impl<C: ColorModel> Bitmap<C> {
         let texels = match cached {
             Some(texels) => texels,
             None => {
-                let loaded = load(&key.0, palette, raw).map_err(|e| e.at(properties.location()))?;
+                let loaded = load(&key.0, palette, raw, properties.budget())
+                    .map_err(|e| e.at(properties.location()))?;
                 let Loaded { texels, clamped } = loaded;
                 if clamped > 0 {
                     let [width, height] = texels.size;
@@ -220,8 +222,10 @@ fn load<C: ColorModel>(
     path: &std::path::Path,
     palette: &Palette<C>,
     raw: bool,
+    budget: &Budget,
 ) -> Result<Loaded<C>> {
-    let Picture { size, pixels } = Picture::read(path, raw)?;
+    let picture = Picture::read(path, raw, budget)?;
+    let size = picture.size;
     let role = if raw && palette.role == Role::Reflectance {
         Role::Quantity
     } else {
@@ -229,13 +233,13 @@ fn load<C: ColorModel>(
     };
     let fits = |rgb: [f32; 3]| rgb.iter().all(|v| (0.0..=1.0).contains(v));
     let clamped = match role {
-        Role::Reflectance => pixels.iter().filter(|rgb| !fits(*rgb)).count(),
+        Role::Reflectance => picture.pixels.iter().filter(|rgb| !fits(*rgb)).count(),
         _ => 0,
     };
     Ok(Loaded {
         texels: Texels {
             size,
-            texels: palette.color.texels(&pixels, role),
+            texels: picture.into_texels(&palette.color, role)?,
         },
         clamped,
     })

@@ -3,9 +3,10 @@
 
 use std::path::Path;
 
-use crate::color::{Pixels, srgb};
+use crate::budget::{Account, Budget};
+use crate::color::{ColorModel, Pixels, Role, srgb};
 use crate::error::{Error, Location, Result};
-use crate::image::{self, Encoding, Image, Limits};
+use crate::image::{self, Encoding, Image};
 
 /// The colours of an image file.
 #[derive(Debug)]
@@ -14,20 +15,24 @@ pub struct Picture {
     pub size: [usize; 2],
     /// Row by row from the top.
     pub pixels: Pixels,
+    account: Account,
 }
 
 impl Picture {
     /// Reads the file; `raw` says that it holds plain numbers.
     ///
     /// # Errors
-    /// Where the file cannot be read or holds no colours.
-    pub fn read(path: &Path, raw: bool) -> Result<Self> {
-        let picture = image::read(path, &Limits::default())?;
+    /// Where the file cannot be read, holds no colours or is larger than the budget allows.
+    pub fn read(path: &Path, raw: bool, budget: &Budget) -> Result<Self> {
+        let account = budget.open();
+        let picture = image::read(path, &account)?;
         let image = picture.image.into_rgb();
         let Some(rgb) = image.rgb() else {
             let message = format!("no colour channels among {:?}", image.channels());
             return Err(Error::input(message).at(&Location::of_file(path)));
         };
+        let size = [image.width() as usize, image.height() as usize];
+        account.take_rows(size[0] * size[1], size_of::<[f32; 3]>())?;
         let decode: fn(f32) -> f32 = match picture.encoding {
             Encoding::Srgb if !raw => srgb::decode,
             Encoding::Srgb | Encoding::Linear => |value| value,
@@ -37,7 +42,7 @@ impl Picture {
         let finite = |value: f32| if value.is_finite() { value } else { 0.0 };
         let linear = |value| finite(decode(value));
         Ok(Self {
-            size: [image.width() as usize, image.height() as usize],
+            size,
             pixels: match codes {
                 Some(codes) => {
                     let values = std::array::from_fn(|code| decode(of_code(code as u8)));
@@ -47,7 +52,20 @@ impl Picture {
                     Pixels::Linear(colors(&image, rgb).map(|color| color.map(linear)).collect())
                 }
             },
+            account,
         })
+    }
+
+    /// Its texels in the form in which they are evaluated; their memory is kept in place of the picture's.
+    ///
+    /// # Errors
+    /// Where the budget does not allow it.
+    pub fn into_texels<C: ColorModel>(self, color: &C, role: Role) -> Result<C::Texels> {
+        let count = self.pixels.count();
+        self.account.take_rows(count, C::TEXEL_BYTES)?;
+        let texels = color.texels(&self.pixels, role);
+        self.account.keep((count * C::TEXEL_BYTES) as u64);
+        Ok(texels)
     }
 }
 

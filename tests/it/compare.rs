@@ -526,7 +526,10 @@ fn json_holds_every_metric_and_maps_have_their_legend() {
             1,
             "",
         );
-        let map = image::read(&place.path(&format!("{of}.png")), &image::Limits::default());
+        let map = image::read(
+            &place.path(&format!("{of}.png")),
+            &etendue::budget::Budget::default().open(),
+        );
         let map = map.unwrap().image;
         assert_eq!((map.width(), map.height()), (432, 472), "{of}");
     }

@@ -10,9 +10,10 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use etendue::budget::Budget;
 use etendue::description::{Description, Options as ReadOptions};
 use etendue::display;
-use etendue::image::{self, Image, Limits, Metadata};
+use etendue::image::{self, Image, Metadata};
 use etendue::render::{Options, Overrides, Silent, render};
 
 use super::support::at;
@@ -29,8 +30,8 @@ fn scenes() -> Vec<PathBuf> {
 
 /// Renders a scene small, as a PNG at `path`.
 fn render_small(scene: &Path, path: &Path) {
-    let mut description =
-        Description::read(scene, &ReadOptions::default()).unwrap_or_else(|e| panic!("{e}"));
+    let mut description = Description::read(scene, &ReadOptions::default(), &Budget::default())
+        .unwrap_or_else(|e| panic!("{e}"));
     Overrides {
         spp: Some(16),
         size: Some((72, 54)),
@@ -44,7 +45,7 @@ fn render_small(scene: &Path, path: &Path) {
 }
 
 fn read(path: &Path) -> Image {
-    let picture = image::read(path, &Limits::default());
+    let picture = image::read(path, &Budget::default().open());
     picture
         .unwrap_or_else(|e| panic!("{e}\nETENDUE_BLESS=1 makes new images"))
         .image

@@ -15,6 +15,7 @@ mod instances;
 mod known_radiance;
 mod layers;
 mod lights;
+mod memory;
 mod mesh;
 mod mitsuba_data;
 mod motion;

@@ -422,8 +422,8 @@ fn a_render_of_what_moves_that_is_stopped_goes_on_to_the_same_bits() {
         ]);
     }
     let [whole, part] = ["whole.exr", "part.exr"].map(|name| {
-        let limits = etendue::image::Limits::default();
-        etendue::image::read(&folder.path().join(name), &limits)
+        let path = folder.path().join(name);
+        etendue::image::read(&path, &Default::default())
             .unwrap()
             .image
     });

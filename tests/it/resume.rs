@@ -1,11 +1,14 @@
 //! Renders in processes of their own that are stopped and killed: what is left, and how they go on.
 
 use std::fs;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant, SystemTime};
 
-use etendue::image::{self, Image, Limits};
+use etendue::budget::Budget;
+use etendue::description::declared::Takes;
+use etendue::image::{self, Image};
 use serde_json::Value;
 
 const SCENE: &str = r#"<scene version="3.0.0">
@@ -57,7 +60,7 @@ impl Place {
 }
 
 fn read(path: &Path) -> Image {
-    image::read(path, &Limits::default()).unwrap().image
+    image::read(path, &Budget::default().open()).unwrap().image
 }
 
 fn object(output: &Output) -> Value {
@@ -153,7 +156,7 @@ fn each_signal_leaves_a_valid_image_and_a_second_start_finishes_it() {
         assert_eq!(told["status"], "interrupted");
         let said = String::from_utf8_lossy(&output.stderr);
         assert!(said.contains("passes"), "{said}");
-        let picture = image::read(&place.path(&name), &Limits::default()).unwrap();
+        let picture = image::read(&place.path(&name), &Budget::default().open()).unwrap();
         let samples = &told["completed"]["samples"];
         let entry = picture
             .metadata
@@ -219,6 +222,10 @@ fn scene_of_files(place: &Place) -> Vec<(&'static str, Vec<u8>)> {
         <shape type="stl"><string name="filename" value="mesh.stl"/></shape>
         <shape type="obj"><string name="filename" value="mesh.obj"/><boolean name="materials" value="true"/></shape>
         <shape type="gltf"><string name="filename" value="mesh.gltf"/></shape>
+        <shape type="ply"><string name="filename" value="mesh.ply.gz"/></shape>
+        <shape type="serialized"><string name="filename" value="mesh.serialized"/></shape>
+        <shape type="rectangle"><texture type="bitmap" name="displacement"><string name="filename" value="heights.png"/>
+            </texture><float name="displacement_edge" value="0.5"/></shape>
         <shape type="sphere"><bsdf type="diffuse"><spectrum name="reflectance" filename="curve.spd"/></bsdf></shape>
         <emitter type="envmap"><string name="filename" value="sky.png"/></emitter>"#;
     const MATERIALS: &str = r#"<bsdf type="diffuse" id="textured"><texture type="bitmap" name="reflectance">
@@ -237,6 +244,22 @@ fn scene_of_files(place: &Place) -> Vec<(&'static str, Vec<u8>)> {
         bytes.into_inner()
     };
     let text = |text: &str| text.as_bytes().to_vec();
+    let gzip = |text: &str| {
+        let mut gzip = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+        gzip.write_all(text.as_bytes()).unwrap();
+        gzip.finish().unwrap()
+    };
+    // Flags, a name, three vertices, one triangle; and where it begins.
+    let serialized = |last: f32| -> Vec<u8> {
+        let mut zlib = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::fast());
+        let counts = [3_u64, 1].map(u64::to_le_bytes).concat();
+        let corners = [0_u32, 1, 2].map(u32::to_le_bytes).concat();
+        for part in [&[0; 5][..], &counts, &floats(last), &corners] {
+            zlib.write_all(part).unwrap();
+        }
+        let stream = zlib.finish().unwrap();
+        [&[0x1c, 4, 4, 0][..], &stream, &[0; 8], &1_u32.to_le_bytes()].concat()
+    };
     let obj = "mtllib mesh.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n";
     let files = [
         ("mesh.ply", text(PLY), text(&PLY.replace("0 1 0", "0 2 0"))),
@@ -257,6 +280,13 @@ fn scene_of_files(place: &Place) -> Vec<(&'static str, Vec<u8>)> {
         ),
         ("picture.png", picture(100), picture(101)),
         ("sky.png", picture(100), picture(101)),
+        ("heights.png", picture(100), picture(101)),
+        (
+            "mesh.ply.gz",
+            gzip(PLY),
+            gzip(&PLY.replace("0 1 0", "0 2 0")),
+        ),
+        ("mesh.serialized", serialized(1.0), serialized(2.0)),
         (
             "materials.xml",
             document(MATERIALS),
@@ -290,6 +320,16 @@ fn scene_of_files(place: &Place) -> Vec<(&'static str, Vec<u8>)> {
 fn a_change_of_any_file_that_the_scene_reads_is_named_and_nothing_is_resumed() {
     let place = Place::new();
     let others = scene_of_files(&place);
+    let texts = ["materials.xml", "deep.xml"].map(|name| fs::read_to_string(place.path(name)));
+    let texts = texts.map(Result::unwrap).concat();
+    for listed in etendue::render::plugins() {
+        let names_files = listed.plugin.rows().any(|row| row.takes == Takes::File);
+        let name = listed.name;
+        assert!(
+            !names_files || texts.contains(&format!("type=\"{name}\"")),
+            "{name} is not in the scene"
+        );
+    }
     let arguments = [
         "-o",
         "a.exr",
@@ -327,4 +367,39 @@ fn a_change_of_any_file_that_the_scene_reads_is_named_and_nothing_is_resumed() {
         said.contains("cannot be continued") && said.contains("mesh.mtl"),
         "{said}"
     );
+}
+
+/// A disk that takes a kilobyte of a file and no more.
+#[cfg(unix)]
+#[test]
+fn on_a_full_disk_nothing_is_left_but_what_was_there() {
+    let place = Place::new();
+    fs::write(place.path("a.exr"), "old").unwrap();
+    let there = || -> Vec<_> {
+        let names = fs::read_dir(place.0.path()).unwrap();
+        let mut names: Vec<_> = names.map(|entry| entry.unwrap().file_name()).collect();
+        names.sort();
+        names
+    };
+    let before = there();
+    for arguments in [
+        "render scene.xml -o a.exr --spp 16 --checkpoint 0.001",
+        "render scene.xml -o a.exr --checkpoint 0.001 --noise-threshold 0.1 --max-spp 16",
+        "mesh generate terrain hills.ply --triangles 1k",
+        "profile scene.xml --quick --sweep samples --rounds 1 -o .",
+    ] {
+        let program = env!("CARGO_BIN_EXE_etendue");
+        let output = Command::new("sh")
+            .current_dir(place.0.path())
+            .args([
+                "-c",
+                &format!("trap '' XFSZ; ulimit -f 1; exec {program} {arguments}"),
+            ])
+            .output()
+            .unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(3), "{arguments}: {said}");
+        assert_eq!(there(), before, "{arguments}: {said}");
+        assert_eq!(fs::read(place.path("a.exr")).unwrap(), b"old");
+    }
 }

@@ -17,9 +17,10 @@ pub(super) fn against_reference(
         return Err(Error::input("a reference needs --variance and --spp"));
     };
     let selection = arguments.selection();
-    let layer = Layer::read(path, &selection)?;
-    let mean = Layer::read(reference, &selection)?;
-    let variance = Layer::read(variance, &selection)?;
+    let budget = arguments.memory.budget();
+    let layer = Layer::read(path, &selection, &budget)?;
+    let mean = Layer::read(reference, &selection, &budget)?;
+    let variance = Layer::read(variance, &selection, &budget)?;
     let reference = Reference {
         mean: &mean,
         variance: &variance,

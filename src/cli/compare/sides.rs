@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use etendue::budget::Budget;
 use etendue::compare::seeds::{self, Side, Verdict};
 use etendue::compare::{Layer, pair};
 use etendue::error::{Error, Location, Result};
@@ -10,8 +11,9 @@ use serde_json::Value;
 use super::{Arguments, Outcome, T_TOP, head};
 
 pub(super) fn sides(arguments: &Arguments) -> Result<Outcome> {
-    let (a, layer) = side(arguments, &arguments.a)?;
-    let (b, _) = side(arguments, &arguments.b)?;
+    let budget = arguments.memory.budget();
+    let (a, layer) = side(arguments, &arguments.a, &budget)?;
+    let (b, _) = side(arguments, &arguments.b, &budget)?;
     let verdict = seeds::judge(&a, &b, arguments.confidence)?;
     if let Some(precision) = arguments.precision {
         let mean = &verdict.means[0];
@@ -47,12 +49,12 @@ fn names(paths: &[PathBuf]) -> Value {
 }
 
 /// Reads the images of a side, one after another; the first layer comes along.
-fn side(arguments: &Arguments, paths: &[PathBuf]) -> Result<(Side, Layer)> {
+fn side(arguments: &Arguments, paths: &[PathBuf], budget: &Budget) -> Result<(Side, Layer)> {
     let selection = arguments.selection();
     let mut gathered: Option<(Side, Layer)> = None;
     for path in paths {
         let here = |e: Error| e.at(&Location::of_file(path));
-        let layer = Layer::read(path, &selection)?;
+        let layer = Layer::read(path, &selection, budget)?;
         pair::check_finite(&layer, "it").map_err(here)?;
         match &mut gathered {
             Some((side, _)) => side.push(&layer.image).map_err(here)?,

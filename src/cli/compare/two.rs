@@ -3,7 +3,9 @@
 use std::path::Path;
 
 use etendue::compare::map;
+use etendue::compare::metric::ChannelMeans;
 use etendue::compare::pair::{self, Report};
+use etendue::compare::seeds;
 use etendue::compare::{Layer, flip};
 use etendue::error::{Error, Location, Result};
 use etendue::image::Encoding;
@@ -13,9 +15,10 @@ use super::{Arguments, Limit, MapOf, Outcome, head};
 
 pub(super) fn two(arguments: &Arguments, path_a: &Path, path_b: &Path) -> Result<Outcome> {
     let selection = arguments.selection();
+    let budget = arguments.memory.budget();
     let (mut a, mut b) = (
-        Layer::read(path_a, &selection)?,
-        Layer::read(path_b, &selection)?,
+        Layer::read(path_a, &selection, &budget)?,
+        Layer::read(path_b, &selection, &budget)?,
     );
     Layer::align(&mut a, &mut b)?;
     for (layer, path) in [(&a, path_a), (&b, path_b)] {
@@ -77,6 +80,14 @@ fn table(report: &Report) -> Vec<String> {
     lines
 }
 
+/// By how much B is brighter, over all channels.
+fn in_words(report: &Report) -> String {
+    let mean = |of: fn(&ChannelMeans) -> f64| report.channels.iter().map(of).sum::<f64>();
+    let (a, b) = (mean(|c| c.a), mean(|c| c.b));
+    let scale = if a == 0.0 { 1.0 } else { a };
+    seeds::brighter("B", "luminance", a, (b - a) / scale)
+}
+
 /// Whether a pair keeps within the limits or, without any, is equal; and that in words.
 fn judge(arguments: &Arguments, report: &Report) -> Result<(bool, String)> {
     let above = arguments.fail_above.iter().map(|l| (l, true));
@@ -88,14 +99,15 @@ fn judge(arguments: &Arguments, report: &Report) -> Result<(bool, String)> {
         };
         let [width, height] = report.size.map(u64::from);
         let sentence = format!(
-            "A and B differ in {} of {} pixels, most at {}, {} in {} ({} and {})",
+            "A and B differ in {} of {} pixels, most at {}, {} in {} ({} and {}); {}",
             report.differing_pixels,
             width * height,
             worst.x,
             worst.y,
             worst.channel,
             worst.a,
-            worst.b
+            worst.b,
+            in_words(report)
         );
         return Ok((false, sentence));
     }

@@ -7,6 +7,7 @@ use etendue::error::{Error, Location, Result};
 use etendue::mesh::{self, Mesh, Parts};
 use serde_json::json;
 
+use super::super::memory::MemoryArguments;
 use super::super::stop::Stop;
 use super::super::{output, report, status};
 
@@ -33,6 +34,8 @@ pub(in crate::cli) struct Arguments {
     /// Print a JSON object for each file that is written
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    memory: MemoryArguments,
     /// No word on what was written, no warnings
     #[arg(short, long)]
     quiet: bool,
@@ -50,7 +53,7 @@ Exit status: 0 done; 1 the input is wrong; 2 the command line is wrong; 3 the sy
 pub(in crate::cli) fn run(arguments: &Arguments) -> Result<u8> {
     Stop::without_a_trace(vec![arguments.output.clone()])?;
     check_output(&arguments.output)?;
-    let mut read = mesh::read_parts(&arguments.input)?;
+    let mut read = mesh::read_parts(&arguments.input, &arguments.memory.budget())?;
     if !arguments.quiet {
         report::warnings(&read.warnings);
     }

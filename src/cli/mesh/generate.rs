@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
+use etendue::budget::{Budget, human_bytes};
 use etendue::error::{Error, Result};
 use etendue::mesh::{self, Bumps, Mesh};
-use etendue::render::human_bytes;
 use serde_json::json;
 
 use super::super::stop::Stop;
@@ -235,7 +235,7 @@ impl Arguments {
                 mesh::block(*subdivisions)
             }
             file => {
-                let read = mesh::read_parts(Path::new(file))?;
+                let read = mesh::read_parts(Path::new(file), &Budget::new(self.limit()))?;
                 if !self.quiet {
                     report::warnings(&read.warnings);
                 }

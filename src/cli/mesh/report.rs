@@ -3,10 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use etendue::error::Result;
+use etendue::error::{Location, Result};
 use etendue::mesh::{self, Report};
 use serde_json::{Value, json};
 
+use super::super::memory::MemoryArguments;
 use super::super::{info, output, report, status};
 
 /// Measure meshes, and count what is wrong with them
@@ -24,6 +25,8 @@ pub(in crate::cli) struct Arguments {
     /// Print a JSON object for each file
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    memory: MemoryArguments,
     /// No warnings
     #[arg(short, long)]
     quiet: bool,
@@ -57,7 +60,8 @@ pub(in crate::cli) fn run(arguments: &Arguments) -> Result<u8> {
 }
 
 fn examine(arguments: &Arguments, input: &Path) -> Result<Value> {
-    let read = mesh::read_parts(input)?;
+    let budget = arguments.memory.budget();
+    let read = mesh::read_parts(input, &budget)?;
     if !arguments.quiet {
         report::warnings(&read.warnings);
     }
@@ -70,7 +74,12 @@ fn examine(arguments: &Arguments, input: &Path) -> Result<Value> {
     });
     let parts: Vec<Value> = parts.collect();
     let dropped = read.dropped_triangles;
-    let whole = Report::of(&read.merged());
+    // Its edges, and the places of its vertices.
+    const BYTES: u64 = 56;
+    let whole = read.merged();
+    let taken = budget.take(BYTES * whole.triangles.len() as u64);
+    taken.map_err(|e| e.at(&Location::of_file(input)))?;
+    let whole = Report::of(&whole);
     let mut object = serde_json::to_value(&whole).expect("it has only names and numbers");
     object["dropped_triangles"] = dropped.into();
     if parts.len() > 1 {

@@ -14,6 +14,7 @@ use super::resolve::{self, Reference, Scopes};
 use super::upgrade::{self, Version};
 use super::xml::{self, Lines};
 use super::{Description, Kind, Node, NodeId, Options, Property, Value, legacy, transform, values};
+use crate::budget::{Account, Budget};
 use crate::error::{Error, Location, Problem, Result};
 
 /// Levels of nested plugins and includes.
@@ -40,6 +41,8 @@ const STRUCTURE: [&str; 7] = [
 #[derive(Debug)]
 pub(super) struct Reader<'o> {
     options: &'o Options,
+    /// What the scene's texts take of the budget.
+    account: Account,
     pub(super) nodes: Vec<Node>,
     pub(super) ids: BTreeMap<String, (NodeId, Location)>,
     pub(super) references: Vec<Reference>,
@@ -61,9 +64,10 @@ pub(super) struct Reader<'o> {
 }
 
 impl<'o> Reader<'o> {
-    pub(super) fn new(options: &'o Options) -> Self {
+    pub(super) fn new(options: &'o Options, budget: &Budget) -> Self {
         Self {
             options,
+            account: budget.open(),
             nodes: Vec::new(),
             ids: BTreeMap::new(),
             references: Vec::new(),
@@ -96,6 +100,11 @@ impl<'o> Reader<'o> {
         self.document(text, path, scope, None)?;
         let mut report = std::mem::take(&mut self.report);
         self.defines.report_unused(&mut report);
+        for (name, value) in self.defines.implied().to_vec() {
+            let message = format!("${name} is {value}, so that the picture keeps its shape");
+            let note = Error::input(message).at(&Location::of_file(path));
+            self.warn(note.help(format!("-D {name}= says otherwise")));
+        }
         resolve::references(&mut self, &mut report);
         for (id, version) in std::mem::take(&mut self.old_nodes) {
             let node = &mut self.nodes[id.index()];
@@ -124,7 +133,9 @@ impl<'o> Reader<'o> {
             scopes: self.scopes,
             warnings: self.warnings,
             sources: self.sources,
+            implied: self.defines.implied().to_vec(),
             strict: self.options.strict,
+            budget: Budget::default(),
         })
     }
 
@@ -137,6 +148,10 @@ impl<'o> Reader<'o> {
         include: Option<Place<'_>>,
     ) -> Result<()> {
         let lines = Lines::new(text, path);
+        // Of a tag a node of the XML tree, and a node or a property of ours; and the text, with what is made of it.
+        let tags = text.bytes().filter(|byte| *byte == b'<').count();
+        let taken = self.account.take((200 * tags + 3 * text.len()) as u64);
+        taken.map_err(|e| e.at(&Location::of_file(path)))?;
         let text = xml::tidy(text);
         let tree = xml::parse(&text, &lines)?;
         let root = Element::open(tree.root_element(), &lines, &mut self.defines)?;

@@ -3,6 +3,7 @@
 use std::time::{Duration, Instant};
 
 use super::{folder, parse, read};
+use crate::budget::Budget;
 use crate::description::{Description, Kind, Options};
 
 #[test]
@@ -132,7 +133,7 @@ fn a_thousand_problems_are_not_all_listed() {
 #[test]
 fn what_is_not_a_text_file_is_refused() {
     let folder = folder(&[("a.xml", "")]);
-    assert!(Description::read(folder.path(), &Options::default()).is_err());
+    assert!(Description::read(folder.path(), &Options::default(), &Budget::default()).is_err());
     let path = folder.path().join("wide.xml");
     std::fs::write(&path, b"\xff\xfe<\0s").expect("a file");
     let message = read(&folder, "wide.xml").unwrap_err().to_string();

@@ -9,6 +9,7 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::*;
+use crate::budget::Budget;
 
 fn parse(text: &str) -> Result<Description> {
     Description::parse(text, Path::new("test.xml"), &Options::default())
@@ -38,7 +39,11 @@ fn folder(files: &[(&str, &str)]) -> tempfile::TempDir {
 }
 
 fn read(folder: &tempfile::TempDir, name: &str) -> Result<Description> {
-    Description::read(&folder.path().join(name), &Options::default())
+    Description::read(
+        &folder.path().join(name),
+        &Options::default(),
+        &Budget::default(),
+    )
 }
 
 #[test]

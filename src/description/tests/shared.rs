@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::budget::Budget;
 use crate::description::{Description, Kind, Options};
 
 /// The scenes below `folder` of the shared data: every file that is a scene of its own.
@@ -41,7 +42,7 @@ fn every_shared_scene_is_read() {
         }
         assert!(scenes.len() >= least, "{} scenes in {folder}", scenes.len());
         for path in scenes {
-            let scene = Description::read(&path, &Options::default())
+            let scene = Description::read(&path, &Options::default(), &Budget::default())
                 .unwrap_or_else(|e| panic!("{}:\n{e}", path.display()));
             let root = scene.root();
             assert_eq!(root.children(Kind::Sensor).len(), 1, "{}", path.display());
@@ -68,7 +69,7 @@ fn the_shared_scenes_take_their_samples_from_the_command_line() {
     };
     for path in shared_scenes("mitsuba-data/tests/scenes") {
         let text = std::fs::read_to_string(&path).expect("it was listed");
-        let scene = match Description::read(&path, &options) {
+        let scene = match Description::read(&path, &options, &Budget::default()) {
             Ok(scene) => scene,
             Err(error) => {
                 assert!(!text.contains("$spp"), "{error}");
@@ -91,6 +92,7 @@ fn what_mitsuba_reads_is_read_strictly() {
     let edited = ours.iter().filter(|path| path.ends_with("scene_m3.xml"));
     let theirs = shared_scenes("mitsuba-data/tests/scenes");
     for path in edited.chain(&theirs) {
-        Description::read(path, &options).unwrap_or_else(|e| panic!("{}:\n{e}", path.display()));
+        Description::read(path, &options, &Budget::default())
+            .unwrap_or_else(|e| panic!("{}:\n{e}", path.display()));
     }
 }

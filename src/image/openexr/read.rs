@@ -15,19 +15,20 @@ use rayon::prelude::*;
 
 use super::sampling::{self, Sampling};
 use super::{WORLD_TO_CAMERA, WORLD_TO_NDC, batch_length, colors, dwa};
+use crate::budget::Account;
 use crate::error::{Error, Problem, Result};
-use crate::image::{Encoding, Image, Limits, Picture};
+use crate::image::{Encoding, Image, Picture};
 
 /// The first bytes of every OpenEXR file.
 pub(crate) const MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
 
 /// Decodes the bytes of an OpenEXR file.
-pub(crate) fn decode(bytes: &[u8], limits: &Limits) -> Result<Picture> {
+pub(crate) fn decode(bytes: &[u8], account: &Account) -> Result<Picture> {
     let (sampling, bytes) = Sampling::take(bytes);
     let reader = block::read(Cursor::new(&*bytes), false).map_err(refused)?;
     let mut headers = reader.headers().to_vec();
     sampling.put_back(&mut headers)?;
-    check_size(&headers, bytes.len(), limits)?;
+    check_size(&headers, bytes.len(), account)?;
 
     let channels = Channels::of(&headers)?;
     let Vec2(width, height) = headers[0].layer_size;
@@ -111,7 +112,7 @@ fn block_bytes(header: &Header) -> usize {
 }
 
 /// Refuses headers that claim more pixels than the file can hold or the limit allows.
-fn check_size(headers: &[Header], file_bytes: usize, limits: &Limits) -> Result<()> {
+fn check_size(headers: &[Header], file_bytes: usize, account: &Account) -> Result<()> {
     let mut samples = 0_u128;
     let mut coded = 0_u128;
     let mut chunks = 0_u128;
@@ -148,7 +149,12 @@ fn check_size(headers: &[Header], file_bytes: usize, limits: &Limits) -> Result<
             "invalid: a file of {file_bytes} bytes cannot hold {width} × {height} pixels"
         )));
     }
-    limits.check(width as u64, height as u64, samples.saturating_mul(4))
+    // Of each batch the blocks as they are, and on their way through the decoder.
+    let largest = headers.iter().map(block_bytes).max().unwrap_or(1);
+    let batch = largest.saturating_mul(batch_length(largest)) as u128;
+    let bytes = samples * 4 + 3 * batch.min(samples * 4);
+    let bytes = u64::try_from(bytes).unwrap_or(u64::MAX);
+    account.take_for(bytes, &format!("the image of {width} × {height} pixels"))
 }
 
 /// Which sample of the image each channel of the file becomes.

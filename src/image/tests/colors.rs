@@ -12,7 +12,7 @@ use ::exr::prelude::{
 use super::*;
 
 fn try_exr(bytes: &[u8]) -> Result<Picture> {
-    openexr::decode(bytes, &Limits::default())
+    openexr::decode(bytes, &Budget::default().open())
 }
 
 /// Another program's file of one pixel.
@@ -361,7 +361,7 @@ fn the_first_part_of_an_exr_is_the_picture() {
 /// The header, and a pixel of 2^-1 · 128/128.
 fn hdr(header: &str, pixel: [u8; 4]) -> Result<Picture> {
     let bytes = [header.as_bytes(), &pixel].concat();
-    decode(Path::new("a.hdr"), &bytes, &Limits::default())
+    decode(Path::new("a.hdr"), &bytes, &Budget::default().open())
 }
 
 #[test]
@@ -426,7 +426,7 @@ fn pfm_has_a_scale_two_byte_orders_and_the_bottom_row_first() {
         ("Pf\n3 2\n-1.0\n", false, &["Y"], 1.0),
     ] {
         let file = [header.as_bytes(), &bytes(big)].concat();
-        let picture = decode(Path::new("a.pfm"), &file, &Limits::default()).unwrap();
+        let picture = decode(Path::new("a.pfm"), &file, &Budget::default().open()).unwrap();
         assert_eq!(picture.encoding, Encoding::Linear);
         assert_eq!(picture.image.channels(), names);
         let expected = [8.0, 0.0, 3.5, 1.0, -2.0, 0.25].map(|v| v * factor);
@@ -452,7 +452,7 @@ fn ppm_and_its_kin_are_read_in_text_and_in_bytes() {
         (b"P5\n2 1\n65535\n\xff\xff\x33\x33", &["Y"], &[1.0, 0.2]),
         (b"P2\n3 1\n65535\n65535 13107 0", &["Y"], &[1.0, 0.2, 0.0]),
     ] {
-        let picture = decode(Path::new("a"), file, &Limits::default()).unwrap();
+        let picture = decode(Path::new("a"), file, &Budget::default().open()).unwrap();
         assert_eq!(picture.encoding, Encoding::Srgb);
         assert_eq!(picture.image.channels(), names);
         assert_eq!(picture.image.data(), expected);

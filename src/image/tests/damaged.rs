@@ -26,7 +26,7 @@ fn valid_files() -> Vec<(&'static str, Vec<u8>)> {
 }
 
 fn try_decode(name: &str, bytes: &[u8]) -> Result<Picture> {
-    decode(Path::new(name), bytes, &Limits::default())
+    decode(Path::new(name), bytes, &Budget::default().open())
 }
 
 /// `bytes` with the only occurrence of `old` replaced.
@@ -320,13 +320,18 @@ fn limits_hold_before_anything_is_decoded() {
     for (name, bytes) in valid_files() {
         let picture = try_decode(name, &bytes).unwrap();
         let size = size_of_val(picture.image.data()) as u64;
-        let exact = Limits { max_bytes: size };
-        assert!(decode(Path::new(name), &bytes, &exact).is_ok(), "{name}");
-        let small = Limits {
-            max_bytes: size - 1,
-        };
+        // With what decoders need on the way.
+        let budget = Budget::new(Some(8 * size));
+        let account = budget.open();
+        assert!(decode(Path::new(name), &bytes, &account).is_ok(), "{name}");
+        let taken = 8 * size - account.left().unwrap();
+        assert!(taken >= size, "{name}: {taken} of {size}");
+        let small = Budget::new(Some(size - 1)).open();
         let error = decode(Path::new(name), &bytes, &small).unwrap_err();
-        assert!(error.to_string().contains("more than"), "{name}: {error}");
+        assert!(
+            error.to_string().contains("are left of the limit"),
+            "{name}: {error}"
+        );
     }
 }
 
@@ -338,7 +343,7 @@ fn no_count_in_a_file_is_believed() {
         for at in 0..original.len().min(800) - 8 {
             let mut bytes = original.clone();
             bytes[at..at + 8].copy_from_slice(&absurd);
-            if let Ok(picture) = openexr::decode(&bytes, &Limits::default()) {
+            if let Ok(picture) = openexr::decode(&bytes, &Budget::default().open()) {
                 let samples = picture.image.data().len();
                 assert!(samples <= 1 << 20, "{compression} at {at}: {samples}");
             }
@@ -354,9 +359,6 @@ fn random_changes_never_panic() {
         state ^= state >> 7;
         state ^= state << 17;
         (state % below as u64) as usize
-    };
-    let limits = Limits {
-        max_bytes: 64 << 20,
     };
     let foreign = foreign_exrs()
         .into_iter()
@@ -386,7 +388,7 @@ fn random_changes_never_panic() {
                 continue;
             };
             // Past the guard against panics, so that the checks themselves are tested.
-            let result = decode_by(decoder, &bytes, &limits);
+            let result = decode_by(decoder, &bytes, &Budget::new(Some(64 << 20)).open());
             if let Ok(picture) = result {
                 let image = picture.image;
                 let n = image.width() as usize * image.height() as usize * image.channels().len();

@@ -1,6 +1,7 @@
 //! Tests of whole files: what is written is read again, and what is damaged is refused.
 
 use super::*;
+use crate::budget::Budget;
 
 mod colors;
 mod damaged;

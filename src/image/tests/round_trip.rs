@@ -32,7 +32,7 @@ fn exr_keeps_every_bit_of_every_channel() {
         image.data_mut()[..n].copy_from_slice(&odd[..n]);
         let back = in_file("a.exr", |path| {
             write(path, &image, &Metadata::default()).unwrap();
-            read(path, &Limits::default()).unwrap()
+            read(path, &Budget::default().open()).unwrap()
         });
         assert_eq!(back.encoding, Encoding::Linear);
         assert_eq!(back.image.channels(), image.channels());
@@ -44,7 +44,12 @@ fn exr_keeps_every_bit_of_every_channel() {
 #[test]
 fn exr_channels_may_come_in_any_order_and_go_out_colours_first() {
     let image = sample(4, 3, &["depth", "B", "A", "R", "G"]);
-    let back = decode(Path::new("a.exr"), &exr_bytes(&image), &Limits::default()).unwrap();
+    let back = decode(
+        Path::new("a.exr"),
+        &exr_bytes(&image),
+        &Budget::default().open(),
+    )
+    .unwrap();
     assert_eq!(back.image.channels(), ["R", "G", "B", "A", "depth"]);
     for (c, name) in back.image.channels().iter().enumerate() {
         let original = image.channel(name).unwrap();
@@ -66,7 +71,7 @@ fn exr_keeps_its_metadata_in_types_of_their_own() {
         .with("world_to_ndc", Mat4::IDENTITY);
     let image = sample(2, 2, &["Y"]);
     let bytes = openexr::encode(&image, &whole(&image), &metadata).unwrap();
-    let back = decode(Path::new("a.exr"), &bytes, &Limits::default()).unwrap();
+    let back = decode(Path::new("a.exr"), &bytes, &Budget::default().open()).unwrap();
     for (name, value) in [
         ("software", "étendue"),
         ("integrator", "path"),
@@ -107,7 +112,7 @@ fn exr_says_where_a_crop_lies() {
     };
     let back = in_file("crop.exr", |path| {
         write_window(path, &image, &window, &Metadata::default()).unwrap();
-        read(path, &Limits::default()).unwrap()
+        read(path, &Budget::default().open()).unwrap()
     });
     assert_eq!(back.image, image);
     assert_eq!(text(&back, "dataWindow"), Some("3 20 5 4"));
@@ -133,7 +138,12 @@ fn exr_refuses_names_that_would_break_the_file() {
     let twice = Metadata::default().with("a", 1_u32).with("a", "b");
     assert!(openexr::encode(&image, &whole(&image), &twice).is_err());
     let image = sample(2, 2, &["a_layer_with_a_long_name.and_a_channel"]);
-    let back = decode(Path::new("a.exr"), &exr_bytes(&image), &Limits::default()).unwrap();
+    let back = decode(
+        Path::new("a.exr"),
+        &exr_bytes(&image),
+        &Budget::default().open(),
+    )
+    .unwrap();
     assert_eq!(back.image, image);
 }
 
@@ -182,7 +192,7 @@ fn exr_parts_become_layers_of_one_image() {
 }
 
 fn try_exr(bytes: &[u8]) -> Result<Image> {
-    openexr::decode(bytes, &Limits::default()).map(|picture| picture.image)
+    openexr::decode(bytes, &Budget::default().open()).map(|picture| picture.image)
 }
 
 #[test]
@@ -194,7 +204,7 @@ fn hdr_keeps_colours_to_a_hundredth_of_the_brightest() {
             .copy_from_slice(&[f32::NAN, -1.0, 0.0]);
         let back = in_file("a.hdr", |path| {
             write(path, &image, &Metadata::default()).unwrap();
-            read(path, &Limits::default()).unwrap()
+            read(path, &Budget::default().open()).unwrap()
         });
         assert_eq!(back.encoding, Encoding::Linear);
         assert_eq!(back.image.pixel(0, 0), [0.0; 3]);
@@ -227,7 +237,7 @@ fn hdr_survives_the_ends_of_its_range() {
     ];
     image.data_mut().copy_from_slice(&odd);
     let bytes = radiance::encode(&image).unwrap();
-    let back = decode(Path::new("a.hdr"), &bytes, &Limits::default()).unwrap();
+    let back = decode(Path::new("a.hdr"), &bytes, &Budget::default().open()).unwrap();
     let values: Vec<f32> = back.image.view().row(0, 0).collect();
     assert!(values[..3].iter().all(|&v| v > 0.9e38), "{values:?}");
     assert_eq!(values[4..], [0.0, 0.0, 0.0, 1.0]);
@@ -241,7 +251,7 @@ fn png_codes_come_back_unchanged() {
         let codes = Codes::new(16, 16, layout, data.clone()).unwrap();
         let back = in_file("a.png", |path| {
             write_codes(path, &codes).unwrap();
-            read(path, &Limits::default()).unwrap()
+            read(path, &Budget::default().open()).unwrap()
         });
         assert_eq!(back.encoding, Encoding::Srgb);
         let values: Vec<f32> = data.iter().map(|&v| f32::from(v) / 255.0).collect();
@@ -261,7 +271,7 @@ fn integers_of_8_and_16_bits_become_code_values() {
         (ExtendedColorType::Rgba16, &["R", "G", "B", "A"], 65535.0),
     ] {
         let bytes = raster_bytes(9, 5, color, ImageFormat::Png);
-        let picture = decode(Path::new("a.png"), &bytes, &Limits::default()).unwrap();
+        let picture = decode(Path::new("a.png"), &bytes, &Budget::default().open()).unwrap();
         assert_eq!(picture.image.channels(), names);
         let first = if most == 255.0 {
             37.0 / 255.0
@@ -281,12 +291,12 @@ fn the_content_decides_and_not_the_name() {
         of(ImageFormat::Bmp),
         of(ImageFormat::Pnm),
     ] {
-        let picture = decode(Path::new("a.exr"), &bytes, &Limits::default()).unwrap();
+        let picture = decode(Path::new("a.exr"), &bytes, &Budget::default().open()).unwrap();
         assert_eq!((picture.image.width(), picture.image.height()), (16, 6));
     }
     let tga = raster_bytes(9, 5, ExtendedColorType::Rgb8, ImageFormat::Tga);
-    assert!(decode(Path::new("a.TGA"), &tga, &Limits::default()).is_ok());
-    assert!(decode(Path::new("a.dat"), &tga, &Limits::default()).is_err());
+    assert!(decode(Path::new("a.TGA"), &tga, &Budget::default().open()).is_ok());
+    assert!(decode(Path::new("a.dat"), &tga, &Budget::default().open()).is_err());
 }
 
 #[test]
@@ -314,7 +324,7 @@ fn every_image_of_the_shared_scenes_can_be_read() {
     let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data"));
     let mut read_images = 0;
     for path in images_below(root) {
-        let picture = read(&path, &Limits::default()).unwrap_or_else(|e| panic!("{e}"));
+        let picture = read(&path, &Budget::default().open()).unwrap_or_else(|e| panic!("{e}"));
         assert!(picture.image.width() > 0 && !picture.image.channels().is_empty());
         let linear = path
             .extension()

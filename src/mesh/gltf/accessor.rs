@@ -4,6 +4,7 @@
 use super::OrWhy;
 use super::container::Buffers;
 use super::json::{Accessor, BufferView, Root, Sparse, at, meshopt};
+use crate::budget::Account;
 
 /// Elements that an accessor without data may have: all of them are zero, and take no room in the file.
 const MOST_ZEROS: usize = 1 << 24;
@@ -12,6 +13,8 @@ const MOST_ZEROS: usize = 1 << 24;
 pub(super) struct Accessors<'a> {
     pub(super) root: &'a Root<'a>,
     pub(super) buffers: &'a Buffers<'a>,
+    /// Who is asked for memory.
+    pub(super) account: &'a Account,
 }
 
 /// The kinds of numbers, as glTF writes them.
@@ -84,7 +87,11 @@ impl Accessors<'_> {
                     "has no data for its {count} elements; at most {MOST_ZEROS} may be zeros"
                 ));
             }
-            None => vec![[T::default(); N]; count],
+            None => {
+                let taken = self.account.take_rows(count as u64, size_of::<[T; N]>());
+                taken.map_err(|e| e.to_string())?;
+                vec![[T::default(); N]; count]
+            }
         };
         if let Some(sparse) = &accessor.sparse {
             self.replace(&mut rows, sparse, &component)?;

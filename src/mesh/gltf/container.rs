@@ -11,6 +11,7 @@ use base64::engine::general_purpose::{GeneralPurpose, GeneralPurposeConfig};
 
 use super::OrWhy;
 use super::json::{Buffer, Root};
+use crate::budget::Account;
 
 /// A GLB file's two parts.
 pub(super) struct Container<'a> {
@@ -92,7 +93,12 @@ enum Place {
 
 impl<'a> Buffers<'a> {
     /// Loads the buffers of the file `path`.
-    pub(super) fn load(root: &Root<'_>, binary: Option<&'a [u8]>, path: &Path) -> Self {
+    pub(super) fn load(
+        root: &Root<'_>,
+        binary: Option<&'a [u8]>,
+        path: &Path,
+        account: &Account,
+    ) -> Self {
         let mut buffers = Self {
             binary,
             places: Vec::new(),
@@ -106,7 +112,9 @@ impl<'a> Buffers<'a> {
                 None if index == 0 && binary.is_some() => Ok(Place::Container),
                 None => Err("it is not in the file".to_owned()),
                 Some(uri) if is_data(uri) => {
-                    decode(uri).map(|bytes| Place::Contents(buffers.keep(bytes)))
+                    let taken = account.take(2 * uri.len() as u64);
+                    let bytes = taken.map_err(|e| e.to_string()).and_then(|()| decode(uri));
+                    bytes.map(|bytes| Place::Contents(buffers.keep(bytes)))
                 }
                 Some(uri) => beside(uri, path).and_then(|file| {
                     let resolved = file.canonicalize().unwrap_or_else(|_| file.clone());
@@ -114,7 +122,7 @@ impl<'a> Buffers<'a> {
                     let place = match known {
                         Some((_, place)) => place.clone(),
                         None => {
-                            let place = read_file(&file).map(|bytes| buffers.keep(bytes));
+                            let place = read_file(&file, account).map(|bytes| buffers.keep(bytes));
                             buffers.files.push(file);
                             read.push((resolved, place.clone()));
                             place
@@ -199,10 +207,11 @@ fn beside(uri: &str, path: &Path) -> OrWhy<PathBuf> {
     Ok(path.with_file_name("").join(name))
 }
 
-fn read_file(file: &Path) -> OrWhy<Vec<u8>> {
+fn read_file(file: &Path, account: &Account) -> OrWhy<Vec<u8>> {
     let read = || -> std::io::Result<Vec<u8>> {
         let opened = crate::file::open(file)?;
         let about = opened.metadata()?;
+        (account.take(about.len())).map_err(std::io::Error::other)?;
         let mut bytes = Vec::new();
         opened.take(about.len()).read_to_end(&mut bytes)?;
         Ok(bytes)

@@ -23,6 +23,7 @@ use glam::DMat4;
 
 use super::read::{Decoded, Input, Loaded, ReadOptions, warnings, with_input};
 use super::{Attribute, Mesh, Per};
+use crate::budget::{Account, Budget};
 use crate::error::{Error, Location, Problem, Result};
 use accessor::Accessors;
 use container::{Buffers, Container};
@@ -95,12 +96,12 @@ type OrWhy<T> = std::result::Result<T, String>;
 /// Vertices, and corners of triangles, that a scene may come to when its nodes share meshes.
 const MOST: usize = 1 << 28;
 
-/// Reads the default scene of the glTF or GLB file `path`, part by part.
+/// Reads the default scene of the glTF or GLB file `path`, part by part. The account is asked for all that this takes.
 ///
 /// # Errors
 /// Where the file or a buffer that it names cannot be read or is malformed.
-pub fn read_gltf(path: &Path, options: &ReadOptions) -> Result<GltfScene> {
-    let walk = with_input(path, |input| walk(input, options))?;
+pub fn read_gltf(path: &Path, options: &ReadOptions, account: &Account) -> Result<GltfScene> {
+    let walk = with_input(path, account, |input| walk(input, options))?;
     let mut scene = GltfScene {
         camera: walk.camera,
         ..GltfScene::default()
@@ -128,13 +129,25 @@ pub fn read_gltf(path: &Path, options: &ReadOptions) -> Result<GltfScene> {
 ///
 /// # Errors
 /// Where the file cannot be read or is malformed.
-pub fn read_gltf_camera(path: &Path) -> Result<Option<GltfCamera>> {
-    let bytes = with_input(path, |input| input.bytes())?;
+pub fn read_gltf_camera(path: &Path, budget: &Budget) -> Result<Option<GltfCamera>> {
+    let account = budget.open();
+    let bytes = with_input(path, &account, |input| input.bytes())?;
     let camera = || -> OrWhy<Option<GltfCamera>> {
-        let root = Root::parse(Container::open(&bytes)?.json)?;
+        let json = Container::open(&bytes)?.json;
+        take_tree(json, &account)?;
+        let root = Root::parse(json)?;
         Ok(Stage::set(&root, &mut Notes::default())?.camera)
     };
     camera().map_err(|why| Error::input(why).at(&Location::of_file(path)))
+}
+
+/// Asks for the memory of a JSON text's objects and numbers.
+fn take_tree(json: &[u8], account: &Account) -> OrWhy<()> {
+    const OBJECT: usize = 512;
+    const MEMBER: usize = 32;
+    let count = |wanted: u8| json.iter().filter(|byte| **byte == wanted).count();
+    let bytes = count(b'{') * OBJECT + count(b',') * MEMBER;
+    account.take(bytes as u64).map_err(|e| e.to_string())
 }
 
 /// All parts as one mesh, with their colours.
@@ -210,10 +223,11 @@ struct Walk {
 }
 
 fn walk(input: Input<'_>, options: &ReadOptions) -> Result<Walk> {
-    let path = input.path;
+    let (path, account) = (input.path, input.account);
     let bytes = input.bytes()?;
     let walked = || -> OrWhy<Walk> {
         let container = Container::open(&bytes)?;
+        take_tree(container.json, account)?;
         let root = Root::parse(container.json)?;
         let mut walk = Walk::default();
         let stage = Stage::set(&root, &mut walk.notes)?;
@@ -221,10 +235,11 @@ fn walk(input: Input<'_>, options: &ReadOptions) -> Result<Walk> {
         if !root.animations.is_empty() {
             (walk.notes).add("animations are left out: nodes and weights stand at rest");
         }
-        let buffers = Buffers::load(&root, container.binary, path);
+        let buffers = Buffers::load(&root, container.binary, path, account);
         let accessors = Accessors {
             root: &root,
             buffers: &buffers,
+            account,
         };
         for placed in &stage.nodes {
             walk.node(placed, &stage, &accessors)?;
@@ -315,6 +330,14 @@ impl Walk {
                 "the scene has more than {MOST} vertices and corners when its meshes are placed"
             ));
         }
+        // With what is put together on the way, and the mesh that all parts are appended to.
+        const VERTEX: usize = 100;
+        const CORNER: usize = 20;
+        let bytes = vertices
+            .saturating_mul(VERTEX)
+            .saturating_add(corners.saturating_mul(CORNER));
+        let taken = accessors.account.take_rows(own.places.len() as u64, bytes);
+        taken.map_err(|e| e.to_string())?;
         let mut mesh = recipe.mesh(mode)?;
         if let Some(skin) = placed.node.skin {
             let skin = at(&root.skins, skin, "skin")?;

@@ -6,6 +6,7 @@ use glam::{Vec2, Vec3};
 use serde_json::{Value, json};
 
 use super::*;
+use crate::budget::Budget;
 use crate::mesh::read::testing::decode;
 use crate::mesh::read::{self, Loaded};
 
@@ -136,14 +137,18 @@ fn the_files_that_were_refused_are_read() {
     }
     for name in ["plain", "quant_norm", "requiredunlit", "sparse"] {
         let path = folder.join(format!("a9_{name}.gltf"));
-        let loaded = read::read(&path, &ReadOptions::default()).unwrap();
+        let loaded = read::read(&path, &ReadOptions::default(), &Budget::default()).unwrap();
         let expected = (30.872, [0.0; 3], [2.0, 2.4, 3.0]);
         let (area, low, high) = measures(&loaded.mesh);
         // Sixteen bits a coordinate do not say it to the last digit.
         assert!((area - expected.0).abs() < 2e-3, "{name}: {area}");
         assert_eq!((low, high), (expected.1, expected.2), "{name}");
     }
-    let draco = read::read(&folder.join("a9_draco.gltf"), &ReadOptions::default());
+    let draco = read::read(
+        &folder.join("a9_draco.gltf"),
+        &ReadOptions::default(),
+        &Budget::default(),
+    );
     let draco = draco.unwrap_err().to_string();
     assert!(
         draco.contains("Draco") && draco.contains("without compression"),
@@ -599,18 +604,18 @@ fn a_file_that_many_buffers_name_is_read_once_and_one_that_nobody_needs_may_be_m
     let text = document.json.to_string();
     let path = folder.path().join("test.gltf");
     let root = Root::parse(text.as_bytes()).ok().unwrap();
-    let loaded = Buffers::load(&root, None, &path);
+    let loaded = Buffers::load(&root, None, &path, &Budget::default().open());
     assert_eq!(loaded.held(), bytes.len());
     assert_eq!(
         loaded.files,
         ["é a.bin", "none.bin"].map(|name| folder.path().join(name))
     );
     std::fs::write(&path, &text).unwrap();
-    let loaded = read::read(&path, &ReadOptions::default()).unwrap();
+    let loaded = read::read(&path, &ReadOptions::default(), &Budget::default()).unwrap();
     assert_eq!(loaded.mesh.area(), 2.0);
     document.json["bufferViews"][0]["buffer"] = 251.into();
     std::fs::write(&path, document.json.to_string()).unwrap();
-    let refusal = read::read(&path, &ReadOptions::default())
+    let refusal = read::read(&path, &ReadOptions::default(), &Budget::default())
         .unwrap_err()
         .to_string();
     assert!(refusal.contains("buffer 251: cannot read"), "{refusal}");

@@ -38,6 +38,8 @@ pub(super) struct Blocks<'a> {
     before: Counts,
     /// Lines before the next block.
     lines: usize,
+    /// Bytes that are taken for lines longer than a block.
+    covered: u64,
 }
 
 /// A block's pieces, in order.
@@ -55,6 +57,7 @@ impl<'a> Blocks<'a> {
             rest: None,
             before: Counts::default(),
             lines: 0,
+            covered: 0,
         }
     }
 
@@ -65,6 +68,8 @@ impl<'a> Blocks<'a> {
 
     /// The next block; `None` at the end of the file.
     pub(super) fn next(&mut self) -> Result<Option<Block>> {
+        // A signal ends reading here.
+        self.input.account.take(0)?;
         let Some(mut bytes) = self.bytes()? else {
             return Ok(None);
         };
@@ -119,6 +124,9 @@ impl<'a> Blocks<'a> {
                 return Ok(Some(bytes));
             }
             searched = bytes.len();
+            // A line that is longer than a block, with what is made of it.
+            let wanted = 8 * (bytes.len() + self.cuts.block) as u64;
+            self.input.account.cover(&mut self.covered, wanted)?;
         }
     }
 

@@ -29,15 +29,23 @@ pub(super) fn read(input: Input<'_>, options: &ReadOptions) -> Result<Decoded> {
 /// Reads the file in blocks. While one thread puts a block's pieces together, the others understand the
 /// next.
 fn read_in(cuts: Cuts, input: Input<'_>, options: &ReadOptions) -> Result<Decoded> {
-    let path = input.path;
-    let length = input.length;
+    let Input {
+        path,
+        length,
+        account,
+        ..
+    } = input;
     let mut blocks = Blocks::new(input, cuts);
     let mut obj = Obj {
         polygons: Polygons::new(options.bare),
         ..Obj::default()
     };
+    let mut covered = 0;
     let mut next = blocks.next()?;
     while let Some(Block { pieces, wrong }) = next {
+        // Lists that grow are up to twice as long as what is in them.
+        let pieces_bytes: usize = pieces.iter().map(Piece::bytes).sum();
+        account.cover(&mut covered, (2 * obj.bytes() + 3 * pieces_bytes) as u64)?;
         let (taken, read) = rayon::join(|| obj.take_all(pieces), || blocks.next());
         taken.map_err(|message| Error::input(message).at(&Location::of_file(path)))?;
         if let Some(wrong) = wrong {
@@ -47,6 +55,9 @@ fn read_in(cuts: Cuts, input: Input<'_>, options: &ReadOptions) -> Result<Decode
     }
     check_text(length, &obj, path)?;
     let materials = options.materials || options.bare;
+    if materials && !obj.uses.is_empty() {
+        account.take_rows(obj.triangles.len() as u64, size_of::<[f32; 3]>())?;
+    }
     let colors = materials.then(|| obj.face_colors(path));
     let mut decoded = obj.finish(options);
     if let Some(FaceColors {
@@ -118,6 +129,19 @@ struct FaceColors {
 }
 
 impl Obj {
+    /// Bytes of what was read and of the mesh that will be made of it.
+    fn bytes(&self) -> usize {
+        const VERTEX: usize = size_of::<[u32; 3]>() + size_of::<[f32; 11]>();
+        const OTHER: usize = 2 * size_of::<[u32; 4]>();
+        (self.positions.len() + self.colors.len() + self.normals.len()) * size_of::<Vec3>()
+            + self.uvs.len() * size_of::<Vec2>()
+            + self.first.len() * size_of::<u32>()
+            + self.vertices.len() * VERTEX
+            + self.others.len() * OTHER
+            + self.triangles.len() * size_of::<[u32; 3]>()
+            + self.uses.len() * size_of::<Use>()
+    }
+
     fn take_all(&mut self, pieces: Vec<Piece>) -> OfLine<()> {
         pieces.into_iter().try_for_each(|piece| self.take(piece))
     }
@@ -302,6 +326,7 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
+    use crate::budget::Budget;
     use crate::mesh::read::testing::decode;
 
     fn mesh(text: &str) -> Mesh {
@@ -352,13 +377,13 @@ mod tests {
         std::fs::write(&path, SQUARES).unwrap();
         std::fs::write(folder.path().join("one.mtl"), one).unwrap();
         std::fs::write(folder.path().join("two.mtl"), two).unwrap();
-        let plain = crate::mesh::read(&path, &ReadOptions::default()).unwrap();
+        let plain = crate::mesh::read(&path, &ReadOptions::default(), &Budget::default()).unwrap();
         assert!(plain.mesh.attributes.is_empty() && plain.warnings.is_empty());
         let options = ReadOptions {
             materials: true,
             ..ReadOptions::default()
         };
-        crate::mesh::read(&path, &options).unwrap()
+        crate::mesh::read(&path, &options, &Budget::default()).unwrap()
     }
 
     #[test]
@@ -411,10 +436,12 @@ mod tests {
             good.replace("f -1 1\n", "f -999 1\n"),
         ] {
             let read = |cuts| {
+                let account = Budget::default().open();
                 let input = Input {
                     path: Path::new("cut.obj"),
                     length: text.len() as u64,
                     origin: DVec3::ZERO,
+                    account: &account,
                     reader: &mut text.as_bytes(),
                 };
                 let decoded = read_in(cuts, input, &ReadOptions::default());
@@ -453,7 +480,7 @@ mod tests {
         if !path.exists() {
             return;
         }
-        let ours = crate::mesh::read(path, &ReadOptions::default())
+        let ours = crate::mesh::read(path, &ReadOptions::default(), &Budget::default())
             .unwrap()
             .mesh;
         let (models, _) = tobj::load_obj(path, &tobj::GPU_LOAD_OPTIONS).unwrap();

@@ -68,6 +68,16 @@ pub(super) fn counts(lines: &[u8]) -> Counts {
 }
 
 impl Piece {
+    /// Bytes of what was read.
+    pub(super) fn bytes(&self) -> usize {
+        let vectors = self.positions.len() + self.colors.len() + self.normals.len();
+        vectors * size_of::<Vec3>()
+            + self.uvs.len() * size_of::<Vec2>()
+            + self.corners.len() * size_of::<[u32; 3]>()
+            + self.faces.len() * size_of::<[u32; 4]>()
+            + (self.uses.len() + self.libraries.len()) * 2 * size_of::<(usize, Vec<u8>)>()
+    }
+
     /// Reads the `lines` that stand behind so many others. `origin` is subtracted from positions.
     pub(super) fn read(lines: &[u8], before: Counts, origin: DVec3) -> Self {
         let mut piece = Self {

@@ -47,6 +47,7 @@ pub(super) fn read(input: Input<'_>, options: &ReadOptions) -> Result<Decoded> {
         vertices: 0,
         bare: options.bare,
         origin,
+        widest: 0,
         decoded: Decoded {
             polygons: Polygons::new(options.bare),
             ..Decoded::default()
@@ -90,6 +91,8 @@ struct Ply<'a> {
     bare: bool,
     /// What is subtracted from positions.
     origin: DVec3,
+    /// Bytes that are taken for a face's corners.
+    widest: u64,
     decoded: Decoded,
 }
 
@@ -179,6 +182,8 @@ impl Ply<'_> {
         let attributes: Vec<Vec<Column>> = plans.iter().map(|p| place(&p.properties)).collect();
 
         let count = usize::try_from(element.count).expect("the file holds so many rows");
+        let numbers: usize = attributes.iter().map(Vec::len).sum();
+        self.take(count, size_of::<[f32; 8]>() + numbers * size_of::<f32>())?;
         let mut mesh = Mesh {
             attributes: start(plans, Per::Vertex, count),
             ..Mesh::default()
@@ -314,6 +319,10 @@ impl Ply<'_> {
             };
         let fitting = element.count.min(self.source.remaining() / triangle + 1);
         let fitting = usize::try_from(fitting).expect("the file holds so many rows");
+        let numbers: usize = sources.iter().map(Vec::len).sum();
+        let row = size_of::<[u32; 3]>() + numbers * size_of::<f32>();
+        self.take(fitting, row)?;
+        let mut room = fitting;
         let mut attributes = start(plans, Per::Face, fitting);
         let mut triangles: Vec<[u32; 3]> = Vec::with_capacity(fitting);
 
@@ -344,6 +353,13 @@ impl Ply<'_> {
                 return Err(self.out_of_range(face, wrong));
             }
             degenerate += u64::from(polygon.len() < 3);
+            let wanted = triangles.len() + polygon.len();
+            if wanted > room {
+                // Lists that grow are twice as long as before, and copied there.
+                let grown = wanted.max(2 * room);
+                self.take(grown, row + Polygons::ROW)?;
+                room = grown;
+            }
             let polygons = &mut self.decoded.polygons;
             polygons.push(triangles.len(), polygon.len());
             // In range of `vertices`, which fits into 32 bits.
@@ -466,6 +482,8 @@ impl Ply<'_> {
                     match &mut wanted {
                         Some((place, list)) if *place == i => {
                             list.clear();
+                            let bytes = length.saturating_mul(2 * size_of::<f64>() as u64);
+                            self.source.account.cover(&mut self.widest, bytes)?;
                             for _ in 0..length {
                                 let value = self.read_scalar(item)?;
                                 list.push(value);
@@ -510,6 +528,11 @@ impl Ply<'_> {
                 (0..element.count).try_for_each(|_| self.read_row(element, &mut scalars, None))
             }
         }
+    }
+
+    /// Asks for memory.
+    fn take(&self, rows: usize, size: usize) -> Result<()> {
+        self.source.account.take_rows(rows as u64, size)
     }
 
     fn ends_early(&self, element: &Element, left: u64) -> crate::error::Error {

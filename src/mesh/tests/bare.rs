@@ -1,6 +1,7 @@
 //! What is read of a file that is all there is, and what of one that is a scene's shape.
 
 use super::*;
+use crate::budget::Budget;
 
 fn bare(name: &str, bytes: &[u8]) -> Loaded {
     decode(name, bytes, &ReadOptions::BARE).unwrap_or_else(|e| panic!("{e}"))
@@ -319,7 +320,7 @@ fn the_parts_of_a_mesh_far_from_the_origin_stay_together() {
         text.push_str(&format!("f {} {} {}\n", t[0] + 1, t[1] + 1, t[2] + 1));
     }
     std::fs::write(&path, text).unwrap();
-    let parts = read_parts(&path).unwrap();
+    let parts = read_parts(&path, &Budget::default()).unwrap();
     assert_eq!((parts.parts.len(), parts.warnings.len()), (2, 1));
     let (low, high) = parts.merged().bounds().unwrap();
     assert!(
@@ -332,7 +333,12 @@ fn the_parts_of_a_mesh_far_from_the_origin_stay_together() {
 fn the_shared_faults_are_mended() {
     let Some(data) = data() else { return };
     let faults = data.join("faults");
-    let area = |name: &str| read_parts(&faults.join(name)).unwrap().merged().area();
+    let area = |name: &str| {
+        read_parts(&faults.join(name), &Budget::default())
+            .unwrap()
+            .merged()
+            .area()
+    };
     for (name, wanted) in [
         ("byte-order-mark/a14_bom.obj", 30.872175),
         ("byte-order-mark/g2_loose_bom.obj", 12.944272),
@@ -356,7 +362,9 @@ fn the_shared_faults_are_mended() {
         "bare-integer-colours/a1_uchar_rgba.ply",
         "bare-colours-dropped/a11_vcolor.obj",
     ] {
-        let mesh = read_parts(&faults.join(name)).unwrap().merged();
+        let mesh = read_parts(&faults.join(name), &Budget::default())
+            .unwrap()
+            .merged();
         let [r, g, b] = mesh.attributes[0].row(0)[..3] else {
             panic!()
         };
@@ -365,7 +373,7 @@ fn the_shared_faults_are_mended() {
         }
     }
     for name in ["carriage-returns/k6_mtl.obj", "byte-order-mark/g2_nm.obj"] {
-        let parts = read_parts(&faults.join(name)).unwrap();
+        let parts = read_parts(&faults.join(name), &Budget::default()).unwrap();
         assert!(parts.warnings.is_empty());
         assert_eq!(
             parts.merged().attributes[0].row(0),
@@ -377,7 +385,9 @@ fn the_shared_faults_are_mended() {
         "silently-left-out/meshlab-wedge.ply",
         "bare-colours-dropped/a4_wedge.ply",
     ] {
-        let said = read_parts(&faults.join(name)).unwrap().warnings;
+        let said = read_parts(&faults.join(name), &Budget::default())
+            .unwrap()
+            .warnings;
         assert!(
             said.iter().any(|w| w.to_string().contains("texcoord")),
             "{said:?}"

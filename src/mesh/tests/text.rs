@@ -1,6 +1,7 @@
 //! Text is understood alike whatever its line ends, its byte-order mark and the case of its keywords.
 
 use super::*;
+use crate::budget::Budget;
 
 /// The same text as other programs write it.
 fn variants(text: &[u8]) -> Vec<Vec<u8>> {
@@ -116,7 +117,7 @@ fn materials_and_objects_are_found_whatever_ends_their_lines() {
                 std::fs::write(&path, text(obj)).unwrap();
                 let library = if upper { "A.MTL" } else { "a.mtl" };
                 std::fs::write(folder.path().join(library), text(mtl)).unwrap();
-                let read = read_parts(&path).unwrap();
+                let read = read_parts(&path, &Budget::default()).unwrap();
                 assert!(read.warnings.is_empty(), "{:?}", read.warnings);
                 assert_eq!(read.parts.len(), 2);
                 for part in read.parts {

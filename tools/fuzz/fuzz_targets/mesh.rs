@@ -3,6 +3,7 @@
 
 use std::fs;
 
+use etendue::budget::Budget;
 use etendue::mesh::{ReadOptions, read};
 use libfuzzer_sys::fuzz_target;
 
@@ -15,7 +16,7 @@ fuzz_target!(|bytes: &[u8]| {
     let path = folder.path().join("fuzz").with_extension(extension);
     fs::write(&path, content).expect("the temporary folder can be written");
     for options in [ReadOptions::default(), ReadOptions::BARE] {
-        if let Ok(loaded) = read(&path, &options) {
+        if let Ok(loaded) = read(&path, &options, &Budget::new(Some(1 << 30))) {
             let vertices = loaded.mesh.positions.len();
             assert!(loaded.mesh.triangles.iter().flatten().all(|&i| (i as usize) < vertices));
             loaded.mesh.bounds();

@@ -9,6 +9,6 @@ use libfuzzer_sys::fuzz_target;
 fuzz_target!(|text: &str| {
     if let Ok(description) = Description::parse(text, Path::new("fuzz.xml"), &Options::default()) {
         description.root();
-        description.unread();
+        description.warnings();
     }
 });
