@@ -342,7 +342,7 @@ impl Leaves for Halfway<'_> {
     }
 
     fn numbers(&self) -> Vec<Range<u32>> {
-        vec![self.first..self.first + self.count()]
+        std::iter::once(self.first..self.first + self.count()).collect()
     }
 
     fn digest(&self, hasher: &mut blake3::Hasher) {
