@@ -160,9 +160,9 @@ fn draw_pairs(bencher: Bencher<'_, '_>, name: &str) {
         .bench_local(|| {
             let mut sum = Vec2::ZERO;
             for (pixel, sample) in (0..pixels).flat_map(|x| (0..samples).map(move |i| (x, i))) {
-                let mut stream = Stream::new(0, pixel, 0, sample);
-                for _ in 0..pairs {
-                    sum += stream.next_2d(black_box(&sampler));
+                let stream = Stream::new(0, pixel, 0, sample);
+                for pair in 0..pairs {
+                    sum += stream.pair(black_box(&sampler), 2 * pair);
                 }
             }
             sum

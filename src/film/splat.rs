@@ -4,8 +4,6 @@
 //! (gaussian) of the variance that counting each sample once would. Sums within a group are of single precision, beyond
 //! it of double.
 
-use glam::Vec2;
-
 use crate::filter::{Filter, MAX_RADIUS};
 use crate::lanes::{Kernel, Lanes, MAX_LANES, Mask as _, Task};
 use crate::sensor::Window;
@@ -27,18 +25,6 @@ pub(crate) struct Group {
 }
 
 impl Group {
-    /// The samples of a pixel at these places.
-    pub(crate) fn new(pixel: [u32; 2], offsets: &[Vec2]) -> Self {
-        let row = |axis: usize| {
-            std::array::from_fn(|sample| offsets.get(sample).map_or(0.0, |offset| offset[axis]))
-        };
-        Self {
-            pixel,
-            count: offsets.len(),
-            offsets: [row(0), row(1)],
-        }
-    }
-
     /// Adds the samples to the sums over `window`: for each pixel, row by row, the weight and the values. How many samples
     /// were left out, for they are not finite.
     ///
@@ -182,6 +168,8 @@ fn weights<F: Lanes>(
 
 #[cfg(test)]
 mod tests {
+    use glam::Vec2;
+
     use super::*;
     use crate::math::random;
 
@@ -221,7 +209,14 @@ mod tests {
                     }
                 }
             }
-            let group = Group::new(pixel, &offsets);
+            let row = |axis: usize| {
+                std::array::from_fn(|i| offsets.get(i).map_or(0.0, |offset| offset[axis]))
+            };
+            let group = Group {
+                pixel,
+                count,
+                offsets: [row(0), row(1)],
+            };
             let mut first = None;
             for kernel in Kernel::all() {
                 let mut sums = vec![0.0; expected.len()];

@@ -91,3 +91,23 @@ impl<'a> Decisions<'a> {
         F::load(&row)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_two_decisions_of_a_path_share_a_dimension() {
+        let (sampler, bounces) = (Sampler::default(), Bounces { decisions: 3 });
+        let mut next = FIRST_DIMENSION;
+        for depth in 0..5 {
+            let first = bounces.first(depth).unwrap();
+            for number in 0..3 {
+                let decision = Decisions::new(&sampler, &[], first, number);
+                assert_eq!(decision.first, next);
+                next += DIMENSIONS;
+            }
+        }
+        assert!(bounces.first(u32::MAX / 12).is_none());
+    }
+}

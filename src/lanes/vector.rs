@@ -77,6 +77,12 @@ macro_rules! componentwise {
                 Self { $($c: F::select(mask, yes.$c, no.$c)),+ }
             }
 
+            /// Multiplied component by component.
+            #[inline(always)]
+            pub fn scale(self, by: Self) -> Self {
+                Self { $($c: self.$c * by.$c),+ }
+            }
+
             /// Without signs.
             #[inline(always)]
             pub fn abs(self) -> Self {

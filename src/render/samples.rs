@@ -4,14 +4,12 @@
 use std::ops::Range;
 use std::time::{Duration, Instant};
 
-use glam::Vec2;
-
 use super::prepare::{Job, View};
 use super::progress::Progress;
 use crate::color::ColorModel;
 use crate::film::{GROUP, Group, Layout, Tally};
 use crate::integrator::{Cost, Estimate, Estimates, Estimator as _, Start};
-use crate::lanes::Kernel;
+use crate::lanes::{Kernel, Lanes, Task, Vec2};
 use crate::sampler::{Sampler, Stream};
 
 /// Bytes of path state in flight in a batch: within a core's caches, with rays enough for the tracer.
@@ -28,12 +26,13 @@ pub(super) fn estimate<C: ColorModel, S: Sink>(
     progress: &dyn Progress,
     sink: &mut S,
 ) {
-    let begin = Instant::now();
+    let started = Instant::now();
     let mut batch = Batch {
         job,
         sampler,
         progress,
         layout: job.layout(),
+        streams: Vec::with_capacity(GROUP),
         starts: Vec::new(),
         groups: Vec::new(),
         estimates: Estimates::default(),
@@ -49,19 +48,17 @@ pub(super) fn estimate<C: ColorModel, S: Sink>(
             if batch.starts.len() + GROUP > limit {
                 batch.flush(sink);
             }
-            let mut offsets = [Vec2::ZERO; GROUP];
-            let first = batch.starts.len();
-            for (offset, index) in offsets.iter_mut().zip(&mut indices) {
-                let (start, place) = camera_sample(job, sampler, pixel, stream(pixel, index));
-                batch.starts.push(start);
-                *offset = place;
-            }
-            let count = batch.starts.len() - first;
-            batch.groups.push(Group::new(pixel, &offsets[..count]));
+            let streams = indices.by_ref().take(GROUP);
+            batch.streams.clear();
+            batch
+                .streams
+                .extend(streams.map(|index| stream(pixel, index)));
+            let group = begin(job, sampler, pixel, &batch.streams, &mut batch.starts);
+            batch.groups.push(group);
         }
     }
     batch.flush(sink);
-    let total = begin.elapsed().as_secs_f64();
+    let total = started.elapsed().as_secs_f64();
     let Batch { cost, film, .. } = batch;
     sink.tally().spend(&cost, total, film.as_secs_f64());
 }
@@ -72,6 +69,8 @@ struct Batch<'a, C: ColorModel> {
     sampler: &'a Sampler,
     progress: &'a dyn Progress,
     layout: Layout,
+    /// Of the samples that are begun.
+    streams: Vec<Stream>,
     starts: Vec<Start<C>>,
     /// Of the starts, in their order.
     groups: Vec<Group>,
@@ -132,42 +131,100 @@ const LENS: u32 = 2;
 const TIME: u32 = 4;
 const WAVELENGTH: u32 = 5;
 
-/// A path's start, and its place within the pixel.
-fn camera_sample<C: ColorModel>(
+/// Samples of a pixel that begin at the camera.
+struct CameraSamples<'a, C: ColorModel> {
+    job: &'a Job<'a, C>,
+    pixel: [u32; 2],
+    streams: &'a [Stream],
+    /// Where they lie within the pixel.
+    offsets: &'a [[f32; GROUP]; 2],
+    lenses: &'a [[f32; GROUP]; 2],
+    times: &'a [f32],
+    /// Where they go.
+    starts: &'a mut Vec<Start<C>>,
+    sampler: &'a Sampler,
+}
+
+impl<C: ColorModel> Task for CameraSamples<'_, C> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<F: Lanes>(self) {
+        let View { sensor, film, .. } = &self.job.view;
+        let margin = film.margin() as f32;
+        let [x, y] = self.pixel.map(|n| n as f32 - margin);
+        let (width, height) = (F::splat(film.width as f32), F::splat(film.height as f32));
+        let mut streams = self.streams.iter();
+        for first in (0..self.streams.len()).step_by(F::WIDTH) {
+            let end = self.times.len().min(first + F::WIDTH);
+            let load = |rows: &[[f32; GROUP]; 2], axis: usize| F::from_slice(&rows[axis][first..]);
+            let place = Vec2::new(
+                (F::splat(x) + load(self.offsets, 0)) / width,
+                (F::splat(y) + load(self.offsets, 1)) / height,
+            );
+            let lens = Vec2::new(load(self.lenses, 0), load(self.lenses, 1));
+            sensor.rays(place, lens, &self.times[first..end], |ray| {
+                let Some(stream) = streams.next() else { return };
+                let number = || stream.number(self.sampler, WAVELENGTH);
+                self.starts.push(Start {
+                    ray,
+                    wavelengths: self.job.scene.color().wavelengths(number),
+                    stream: *stream,
+                });
+            });
+        }
+    }
+}
+
+/// Begins samples of a pixel; as many as fit into a group.
+fn begin<C: ColorModel>(
     job: &Job<'_, C>,
     sampler: &Sampler,
-    [x, y]: [u32; 2],
-    mut stream: Stream,
-) -> (Start<C>, Vec2) {
-    let View { sensor, film, .. } = &job.view;
-    let offset = stream.next_2d(sampler);
+    pixel: [u32; 2],
+    streams: &[Stream],
+    starts: &mut Vec<Start<C>>,
+) -> Group {
+    let sensor = &job.view.sensor;
+    let mut pairs = [glam::Vec2::ZERO; GROUP];
+    let pairs = &mut pairs[..streams.len()];
+    let rows = |pairs: &[glam::Vec2]| {
+        let mut rows = [[0.0; GROUP]; 2];
+        for (i, pair) in pairs.iter().enumerate() {
+            (rows[0][i], rows[1][i]) = (pair.x, pair.y);
+        }
+        rows
+    };
+    sampler.fill_2d(streams, 0, pairs);
+    let offsets = rows(pairs);
     // What nobody looks at is not drawn: as a rule three of four draws.
-    let lens = if sensor.has_lens() {
-        stream.seek(LENS);
-        stream.next_2d(sampler)
-    } else {
-        Vec2::ZERO
-    };
+    let mut lenses = [[0.0; GROUP]; 2];
+    if sensor.has_lens() {
+        sampler.fill_2d(streams, LENS, pairs);
+        lenses = rows(pairs);
+    }
     let (open, close) = sensor.shutter();
-    let time = if open < close {
-        stream.seek(TIME);
-        open + stream.next_1d(sampler) * (close - open)
-    } else {
-        open
+    let mut times = [open; GROUP];
+    let times = &mut times[..streams.len()];
+    if open < close {
+        sampler.fill_1d(streams, TIME, times);
+        for time in times.iter_mut() {
+            *time = open + *time * (close - open);
+        }
+    }
+    let samples = CameraSamples {
+        job,
+        pixel,
+        streams,
+        offsets: &offsets,
+        lenses: &lenses,
+        times,
+        starts,
+        sampler,
     };
-    let wavelengths = job.scene.color().wavelengths(|| {
-        stream.seek(WAVELENGTH);
-        stream.next_1d(sampler)
-    });
-    let margin = film.margin() as f32;
-    let place = Vec2::new(x as f32 - margin + offset.x, y as f32 - margin + offset.y)
-        / Vec2::new(film.width as f32, film.height as f32);
-    (
-        Start {
-            ray: sensor.ray(place, lens, time),
-            wavelengths,
-            stream,
-        },
-        offset,
-    )
+    job.scene.tracer().kernel().run(samples);
+    Group {
+        pixel,
+        count: streams.len(),
+        offsets,
+    }
 }

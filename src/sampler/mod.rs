@@ -156,17 +156,16 @@ fn below_one() -> f32 {
     1f32.next_down()
 }
 
-/// One sample's place in the sequence of its pixel, and how many dimensions it has used.
+/// One sample's place in the sequence of its pixel.
 ///
 /// A path's dimensions are the same whatever it meets: 0 and 1 for the place in the pixel, 2 and 3 for the
 /// lens, 4 for the time, 5 for the wavelength; from 8 on each bounce has its own, which its integrator lays
-/// out. Pairs begin at even dimensions: a draw that would begin one at an odd dimension leaves that out. Four
-/// dimensions from a multiple of four on may be placed jointly, so what is decided together belongs there.
+/// out. Pairs begin at even dimensions. Four dimensions from a multiple of four on may be placed jointly, so what is
+/// decided together belongs there.
 #[derive(Clone, Copy, Debug)]
 pub struct Stream {
     key: u64,
     index: u32,
-    dimension: u32,
 }
 
 impl Stream {
@@ -176,35 +175,18 @@ impl Stream {
         Self {
             key: random::key(random::key(0, seed), pixel),
             index,
-            dimension: 0,
         }
     }
 
-    /// Goes on to a dimension, such as the first of a bounce.
-    ///
-    /// # Panics
-    /// If it was used: a bounce would get its numbers again.
+    /// Its number in `dimension`.
     #[inline]
-    pub fn seek(&mut self, dimension: u32) {
-        assert!(
-            dimension >= self.dimension,
-            "a bounce draws from dimensions of its own"
-        );
-        self.dimension = dimension;
+    pub fn number(&self, sampler: &Sampler, dimension: u32) -> f32 {
+        sampler.get_1d(self.key, self.index, dimension)
     }
 
-    /// The next number in [0, 1).
+    /// Its numbers in `dimension`, which is even, and the next one.
     #[inline]
-    pub fn next_1d(&mut self, sampler: &Sampler) -> f32 {
-        self.dimension += 1;
-        sampler.get_1d(self.key, self.index, self.dimension - 1)
-    }
-
-    /// The next pair in [0, 1)².
-    #[inline]
-    pub fn next_2d(&mut self, sampler: &Sampler) -> Vec2 {
-        let dimension = self.dimension.next_multiple_of(2);
-        self.dimension = dimension + 2;
+    pub fn pair(&self, sampler: &Sampler, dimension: u32) -> Vec2 {
         sampler.get_2d(self.key, self.index, dimension)
     }
 }

@@ -215,13 +215,10 @@ fn no_sampler_correlates_pixels_dimensions_or_sets() {
         let mut columns: Vec<Vec<f32>> = vec![Vec::new(); 12];
         for ((x, y), index) in samples() {
             let mut put = |column: usize, stream: Stream| {
-                let (mut a, mut b) = (stream, stream);
-                a.seek(2 * (column as u32 / 2));
-                b.seek(column as u32 + 100);
-                let pair = a.next_2d(&sampler);
+                let pair = stream.pair(&sampler, 2 * (column as u32 / 2));
                 columns[column].push(pair.x);
                 columns[column + 1].push(pair.y);
-                columns[column + 2].push(b.next_1d(&sampler));
+                columns[column + 2].push(stream.number(&sampler, column as u32 + 100));
             };
             put(0, Stream::new(1, x, y, index)); // the pixel
             put(3, Stream::new(1, x + 1, y, index)); // its neighbour
@@ -238,9 +235,7 @@ fn no_sampler_correlates_pixels_dimensions_or_sets() {
         let dimensions: Vec<Vec<f32>> = (0..20)
             .map(|d| {
                 let value = |((x, y), index)| {
-                    let mut stream = Stream::new(1, x, y, index);
-                    stream.seek(d / 2 * 2);
-                    let pair = stream.next_2d(&sampler);
+                    let pair = Stream::new(1, x, y, index).pair(&sampler, d / 2 * 2);
                     if d % 2 == 0 { pair.x } else { pair.y }
                 };
                 samples().map(value).collect()
@@ -255,21 +250,6 @@ fn no_sampler_correlates_pixels_dimensions_or_sets() {
             }
         }
     }
-}
-
-#[test]
-fn pairs_begin_at_even_dimensions_and_no_dimension_is_drawn_twice() {
-    let sampler = sampler("independent", 4);
-    let mut stream = Stream::new(0, 1, 2, 3);
-    let first = stream.next_1d(&sampler);
-    let pair = stream.next_2d(&sampler);
-    assert_eq!(stream.dimension, 4);
-    let mut again = Stream::new(0, 1, 2, 3);
-    again.seek(2);
-    assert_eq!(pair, again.next_2d(&sampler));
-    assert_ne!(first, pair.x);
-    let back = std::panic::catch_unwind(move || again.seek(3));
-    assert!(back.is_err(), "dimension 3 was drawn");
 }
 
 /// How many of `n` cells the places take, each of which must be a cell's number.

@@ -5,14 +5,15 @@ mod orthographic;
 mod perspective;
 mod thinlens;
 
-use glam::{Mat4, Vec2, Vec3};
+use glam::{Mat3, Mat4, Vec2, Vec3};
 
 use crate::description::declared::{Row, float, motion, nested};
 use crate::description::{Kind, Properties};
 use crate::error::Result;
 use crate::family::family;
 use crate::interaction::Ray;
-use crate::math::Moving;
+use crate::lanes::{self, Lanes};
+use crate::math::{Moving, Transform};
 
 pub use film::{Coordinates, FILMS, Film, PixelFormat, Window};
 pub(crate) use perspective::{FIELD_OF_VIEW, tangent_x};
@@ -44,6 +45,42 @@ family! {
         "orthographic" => Orthographic(orthographic::Orthographic),
         "perspective" => Perspective(perspective::Perspective),
         "thinlens" => ThinLens(thinlens::ThinLens),
+    }
+}
+
+impl Sensor {
+    /// The rays through places of the film and of the lens, as [`Camera::ray`], at `times`; as many as there are of these,
+    /// which fit into the lanes.
+    #[inline(always)]
+    pub fn rays<F: Lanes>(
+        &self,
+        film: lanes::Vec2<F>,
+        lens: lanes::Vec2<F>,
+        times: &[f32],
+        mut take: impl FnMut(Ray),
+    ) {
+        let (mount, [start, end]) = match self {
+            Self::Orthographic(sensor) => (&sensor.mount, sensor.segments(film)),
+            Self::Perspective(sensor) => (&sensor.mount, sensor.segments(film)),
+            Self::ThinLens(sensor) => (sensor.mount(), sensor.segments(film, lens)),
+        };
+        if !mount.to_world.is_still() {
+            for (lane, time) in times.iter().enumerate() {
+                take(mount.ray(start.lane(lane), end.lane(lane), *time));
+            }
+            return;
+        }
+        let rays = Mount::place(&mount.to_world.at(mount.shutter.0), [start, end]);
+        let (origins, directions) = (rays.0.rows(), rays.1.rows());
+        let ends = rays.2.row();
+        for (lane, time) in times.iter().enumerate() {
+            take(Ray {
+                origin: lanes::Vec3::<F>::of(&origins, lane),
+                direction: lanes::Vec3::<F>::of(&directions, lane),
+                t_max: ends[lane],
+                time: *time,
+            });
+        }
     }
 }
 
@@ -101,18 +138,36 @@ impl Mount {
 
     /// The ray from the camera-space point `start` to `end`.
     fn ray(&self, start: Vec3, end: Vec3, time: f32) -> Ray {
-        let to_world = self.to_world.at(time);
-        let origin = to_world.point(start);
-        // Through the linear part: the difference of two far points would cancel.
-        let way = to_world.vector(end - start);
-        let length = way.length();
+        let segment = [start.into(), end.into()];
+        let (origin, direction, t_max) = Self::place::<f32>(&self.to_world.at(time), segment);
         Ray {
-            origin,
-            direction: way / length,
-            t_max: length,
+            origin: origin.into(),
+            direction: direction.into(),
+            t_max,
             time,
         }
     }
+
+    /// Where rays from camera-space points to others start, their directions and their lengths.
+    #[inline(always)]
+    fn place<F: Lanes>(
+        to_world: &Transform,
+        [start, end]: [lanes::Vec3<F>; 2],
+    ) -> (lanes::Vec3<F>, lanes::Vec3<F>, F) {
+        let linear = to_world.linear();
+        let origin = product(linear, start) + lanes::Vec3::all(to_world.translation());
+        // Through the linear part: the difference of two far points would cancel.
+        let way = product(linear, end - start);
+        let length = way.length();
+        (origin, way / length, length)
+    }
+}
+
+/// A matrix times vectors.
+#[inline(always)]
+fn product<F: Lanes>(matrix: Mat3, v: lanes::Vec3<F>) -> lanes::Vec3<F> {
+    let [x, y, z] = [matrix.x_axis, matrix.y_axis, matrix.z_axis].map(lanes::Vec3::<F>::all);
+    x * v.x + y * v.y + z * v.z
 }
 
 #[cfg(test)]

@@ -8,11 +8,12 @@ use crate::description::Properties;
 use crate::description::declared::{Plugin, float};
 use crate::error::Result;
 use crate::interaction::Ray;
+use crate::lanes::{self, Lanes};
 
 /// A camera without perspective.
 #[derive(Clone, Debug)]
 pub struct Orthographic {
-    mount: Mount,
+    pub(super) mount: Mount,
     /// Half the film's extent.
     half: Vec2,
 }
@@ -37,11 +38,21 @@ impl Orthographic {
     }
 }
 
+impl Orthographic {
+    /// In camera space, the ways from near to far.
+    #[inline(always)]
+    pub(super) fn segments<F: Lanes>(&self, film: lanes::Vec2<F>) -> [lanes::Vec3<F>; 2] {
+        let all = |v: Vec2| lanes::Vec2::<F>::all(v);
+        let p = (all(Vec2::ONE) - film * F::splat(2.0)).scale(all(self.half));
+        let Mount { near, far, .. } = self.mount;
+        [p.extend(F::splat(near)), p.extend(F::splat(far))]
+    }
+}
+
 impl Camera for Orthographic {
     fn ray(&self, film: Vec2, _lens: Vec2, time: f32) -> Ray {
-        let p = (Vec2::ONE - 2.0 * film) * self.half;
-        self.mount
-            .ray(p.extend(self.mount.near), p.extend(self.mount.far), time)
+        let [start, end] = self.segments::<f32>(film.into());
+        self.mount.ray(start.into(), end.into(), time)
     }
 
     fn neighbours(&self, ray: &Ray, step: Vec2) -> [Ray; 2] {

@@ -10,11 +10,12 @@ use crate::description::Properties;
 use crate::description::declared::{Plugin, Row, choice, float, string};
 use crate::error::{Error, Result};
 use crate::interaction::Ray;
+use crate::lanes::{self, Lanes};
 
 /// A pinhole camera.
 #[derive(Clone, Debug)]
 pub struct Perspective {
-    mount: Mount,
+    pub(super) mount: Mount,
     /// Half the extent of the film at distance 1, in camera space.
     half: Vec2,
     /// How far the picture is moved to the left and up, in fractions of the film.
@@ -127,14 +128,28 @@ impl Perspective {
         })
     }
 
-    /// The ray that leaves the camera-space point `lens` for where the pinhole's ray has depth `focus`.
-    pub(super) fn ray_through(&self, film: Vec2, lens: Vec2, focus: f32, time: f32) -> Ray {
-        let p = (Vec2::ONE - 2.0 * (film + self.principal_point)) * self.half;
+    /// In camera space, the ways from near to far that leave points of the lens for where the pinhole's have depth `focus`.
+    #[inline(always)]
+    pub(super) fn segments_through<F: Lanes>(
+        &self,
+        film: lanes::Vec2<F>,
+        lens: lanes::Vec2<F>,
+        focus: f32,
+    ) -> [lanes::Vec3<F>; 2] {
+        let all = |v: Vec2| lanes::Vec2::<F>::all(v);
+        let place = (film + all(self.principal_point)) * F::splat(2.0);
+        let p = (all(Vec2::ONE) - place).scale(all(self.half));
         // At depth 1; from the lens's centre it is the pinhole's own.
-        let way = (p - lens / focus).extend(1.0);
-        let start = lens.extend(0.0);
+        let way = (p - lens / F::splat(focus)).extend(F::one());
+        let start = lens.extend(F::zero());
         let Mount { near, far, .. } = self.mount;
-        self.mount.ray(start + way * near, start + way * far, time)
+        [start + way * F::splat(near), start + way * F::splat(far)]
+    }
+
+    /// The same from the pinhole.
+    #[inline(always)]
+    pub(super) fn segments<F: Lanes>(&self, film: lanes::Vec2<F>) -> [lanes::Vec3<F>; 2] {
+        self.segments_through(film, lanes::Vec2::splat(0.0), 1.0)
     }
 
     /// The rays beside `ray`, from points that lie by `spread` of the way between them beside its origin.
@@ -163,7 +178,8 @@ impl Perspective {
 
 impl Camera for Perspective {
     fn ray(&self, film: Vec2, _lens: Vec2, time: f32) -> Ray {
-        self.ray_through(film, Vec2::ZERO, 1.0, time)
+        let [start, end] = self.segments::<f32>(film.into());
+        self.mount.ray(start.into(), end.into(), time)
     }
 
     /// All begin where `ray` does, as in Mitsuba.

@@ -11,13 +11,14 @@ use std::f32::consts::TAU;
 
 use glam::{Mat4, Vec2};
 
+use super::Mount;
 use super::perspective::Perspective;
 use super::{Camera, Film};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, float, integer};
 use crate::error::Result;
 use crate::interaction::Ray;
-use crate::lanes::warp;
+use crate::lanes::{self, Ints as _, Lanes, atan2, warp};
 
 /// A camera with depth of field.
 #[derive(Clone, Debug)]
@@ -32,7 +33,7 @@ pub struct ThinLens {
 struct Aperture {
     radius: f32,
     /// Corners of the polygon that the unit circle is around; none for a disc.
-    corners: Vec<Vec2>,
+    corners: Vec<[f32; 2]>,
 }
 
 impl Aperture {
@@ -49,7 +50,7 @@ impl Aperture {
         let corner = |i: i64| {
             let angle = rotation.to_radians() as f32 + TAU * i as f32 / blades as f32;
             // +x is to the image's left.
-            Vec2::new(-angle.sin(), angle.cos())
+            [-angle.sin(), angle.cos()]
         };
         Ok(Self {
             radius: radius as f32,
@@ -60,17 +61,23 @@ impl Aperture {
     /// A point of the aperture, uniform over it. A polygon's is the disc's at the same share of its sector's
     /// angle and the same fraction of the way from the centre to the rim: areas stay in proportion, and what
     /// was near stays near.
-    fn point(&self, u: Vec2) -> Vec2 {
-        let p = Vec2::from(warp::concentric_disk(u.into()));
-        let n = self.corners.len();
+    #[inline(always)]
+    fn point<F: Lanes>(&self, u: lanes::Vec2<F>) -> lanes::Vec2<F> {
+        let (p, radius) = (warp::concentric_disk(u), F::splat(self.radius));
+        let n = self.corners.len() as u32;
         if n == 0 {
-            return self.radius * p;
+            return p * radius;
         }
-        let turns = p.y.atan2(p.x) / TAU;
-        let sector = (turns - turns.floor()) * n as f32;
-        let i = (sector as usize).min(n - 1);
-        let rim = self.corners[i].lerp(self.corners[(i + 1) % n], sector - i as f32);
-        self.radius * p.length() * rim
+        let turns = atan2(p.y, p.x) * F::splat(1.0 / TAU);
+        let sector = (turns - turns.floor()) * F::splat(n as f32);
+        let i = sector.to_int().min(F::Int::splat(n - 1));
+        let (corners, one) = (self.corners.as_flattened(), F::Int::splat(1));
+        let next = F::Int::select(i.eq(F::Int::splat(n - 1)), F::Int::splat(0), i + one);
+        let (i2, next2) = (i.shl::<1>(), next.shl::<1>());
+        let from = lanes::Vec2::new(F::gather(corners, i2), F::gather(corners, i2 + one));
+        let to = lanes::Vec2::new(F::gather(corners, next2), F::gather(corners, next2 + one));
+        let rim = from + (to - from) * (sector - i.to_float());
+        rim * (radius * p.length_squared().sqrt())
     }
 }
 
@@ -120,11 +127,28 @@ impl ThinLens {
     }
 }
 
-impl Camera for ThinLens {
-    fn ray(&self, film: Vec2, lens: Vec2, time: f32) -> Ray {
+impl ThinLens {
+    pub(super) fn mount(&self) -> &Mount {
+        &self.pinhole.mount
+    }
+
+    /// In camera space, the ways from near to far.
+    #[inline(always)]
+    pub(super) fn segments<F: Lanes>(
+        &self,
+        film: lanes::Vec2<F>,
+        lens: lanes::Vec2<F>,
+    ) -> [lanes::Vec3<F>; 2] {
         let lens = self.aperture.point(lens);
         self.pinhole
-            .ray_through(film, lens, self.focus_distance, time)
+            .segments_through(film, lens, self.focus_distance)
+    }
+}
+
+impl Camera for ThinLens {
+    fn ray(&self, film: Vec2, lens: Vec2, time: f32) -> Ray {
+        let [start, end] = self.segments::<f32>(film.into(), lens.into());
+        self.mount().ray(start.into(), end.into(), time)
     }
 
     /// All go through one point of the lens.
@@ -271,7 +295,7 @@ mod tests {
             let side = 96;
             let at = |x: i32, y: i32| {
                 let u = Vec2::new(x as f32, y as f32) / side as f32;
-                camera.aperture.point(u).as_dvec2()
+                Vec2::from(camera.aperture.point::<f32>(u.into())).as_dvec2()
             };
             let mut total = 0.0;
             let share = expected_area / f64::from(side * side);
@@ -301,9 +325,9 @@ mod tests {
             ));
             camera.unwrap().aperture.corners[0]
         };
-        assert!(corner(0.0).distance(Vec2::Y) < 1e-6);
+        assert!(Vec2::from(corner(0.0)).distance(Vec2::Y) < 1e-6);
         // The image's right.
-        assert!(corner(90.0).distance(Vec2::NEG_X) < 1e-6);
+        assert!(Vec2::from(corner(90.0)).distance(Vec2::NEG_X) < 1e-6);
     }
 
     #[test]

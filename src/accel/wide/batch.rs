@@ -112,7 +112,7 @@ impl Stacks {
         // SAFETY: the index is a block's, and the caller has what `L` needs.
         let lanes = unsafe {
             match LATER && !ray.later_blocks.is_null() {
-                true => L::inside(&block::<LATER>(ray, index), ray),
+                true => L::inside(&moved(ray, index), ray),
                 false => L::inside(&*ray.blocks.add(index), ray),
             }
         };
@@ -131,7 +131,7 @@ impl Stacks {
         let (t, lane, id) = unsafe {
             let standing = &*ray.blocks.add(index as usize);
             let (t, lane) = match LATER && !ray.later_blocks.is_null() {
-                true => L::meet(&block::<LATER>(ray, index as usize), ray),
+                true => L::meet(&moved(ray, index as usize), ray),
                 false => L::meet(standing, ray),
             };
             (t, lane, standing.ids[lane])
@@ -216,19 +216,16 @@ impl Stacks {
     }
 }
 
-/// A block as it stands at the ray's time.
+/// A block that moves, as it stands at the ray's time.
 ///
 /// # Safety
-/// The index is a block's of the tree that the ray is in.
+/// The index is a block's of the tree that the ray is in, whose blocks move.
 #[inline(always)]
-unsafe fn block<const LATER: bool>(ray: &State, index: usize) -> Block {
+unsafe fn moved(ray: &State, index: usize) -> Block {
     // SAFETY: the caller's word; where blocks move there is an end of the way for each.
     unsafe {
         let block = &*ray.blocks.add(index);
-        match LATER && !ray.later_blocks.is_null() {
-            true => block.toward(&*ray.later_blocks.add(index), ray.part),
-            false => *block,
-        }
+        block.toward(&*ray.later_blocks.add(index), ray.part)
     }
 }
 
@@ -241,9 +238,14 @@ fn found<'t, W: Walker<'t>, const ANY: bool, const LATER: bool>(walker: &mut W, 
     }
     let mut uv = (0.0, 0.0);
     if !ANY {
+        let (index, lane) = (ray.place as usize / BLOCK, ray.place as usize % BLOCK);
         // SAFETY: the place is a triangle's in the tree that the ray is in.
-        let block = unsafe { block::<LATER>(ray, ray.place as usize / BLOCK) };
-        let corners = block.triangle(ray.place as usize % BLOCK);
+        let corners = unsafe {
+            match LATER && !ray.later_blocks.is_null() {
+                true => moved(ray, index).triangle(lane),
+                false => (*ray.blocks.add(index)).triangle(lane),
+            }
+        };
         uv = Shear::barycentric(ray.shear().edges(corners));
     }
     walker.found(ray.ray as usize, ray.instance, best, uv);
