@@ -21,7 +21,8 @@ impl Profile {
         let parts = AXES.iter().filter_map(|&(axis, what)| {
             let series = self.series(axis, Way::Tree)?;
             let growth = Tenfold::of(series)?;
-            Some(format!("ten times the {what}: {}", growth.told(axis, calm)))
+            let told = growth.told(axis, calm)?;
+            Some(format!("ten times the {what}: {told}"))
         });
         let mut parts = parts.take(2).collect::<Vec<_>>();
         if let Some(scaling) = self.scaling.iter().find(|s| s.phase == Quantity::Render)
@@ -70,9 +71,10 @@ impl<'a> Tenfold<'a> {
         self.times(|point| median(&quantity.of(point)))
     }
 
-    fn told(&self, axis: Axis, calm: bool) -> String {
+    /// What it costs; nothing where only times would tell and the machine is not calm.
+    fn told(&self, axis: Axis, calm: bool) -> Option<String> {
         let rays = |point: &Point| point.stats.rays() as f64;
-        match (axis, calm) {
+        Some(match (axis, calm) {
             (Axis::Objects, true) => format!(
                 "a ray takes {}, the tree {} to build, and memory is {}",
                 longer(self.time(Quantity::TracePerRay)),
@@ -85,8 +87,11 @@ impl<'a> Tenfold<'a> {
                 as_much(self.memory())
             ),
             (_, true) => format!("rendering takes {}", as_long(self.time(Quantity::Render))),
-            (_, false) => format!("there are {} rays", as_many(self.times(rays))),
-        }
+            (Axis::Lights | Axis::Depth, false) => {
+                format!("there are {} rays", as_many(self.times(rays)))
+            }
+            _ => return None,
+        })
     }
 
     /// Of geometry and trees.
