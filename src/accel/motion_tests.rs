@@ -249,7 +249,7 @@ fn what_deforms_is_at_its_times_what_the_meshes_are() {
             tracer.closest(&rays, Order::Any, &mut hits, &mut Counts::default());
             hits
         });
-        let (mut met, mut facing) = (0, 0);
+        let mut met = 0;
         for ((a, b), ray) in a.iter().zip(&b).zip(&rays) {
             assert_eq!((a.t, a.u, a.v, a.primitive), (b.t, b.u, b.v, b.primitive));
             if a.is_miss() {
@@ -259,15 +259,12 @@ fn what_deforms_is_at_its_times_what_the_meshes_are() {
             let [p, q] =
                 [(&moving, a), (&still, b)].map(|(tracer, hit)| tracer.interaction(ray, hit));
             assert!(p.position.distance(q.position) < 1e-5 && p.normal.distance(q.normal) < 1e-4);
-            facing += u32::from(p.frame.n.dot(p.normal) > 0.0);
+            // The mesh that stands has the normals of the first time.
+            assert!(time != 0.1 || p.frame.n.distance(q.frame.n) < 1e-4);
             let again = moving.position_at(a, &p, time);
             assert!(again.distance(p.position) < 1e-4);
         }
         assert!(met > 500, "{time}: {met}");
-        // The normals of the vertices at both ends of the way, and of none between, were computed; where a mesh is jagged
-        // some face the other way.
-        let end = time == 0.1 || time == 1.0;
-        assert!(!end || 100 * facing > 95 * met, "{time}: {facing} of {met}");
     }
 }
 

@@ -110,7 +110,6 @@ fn scaled(rgb: [f32; 3]) -> (f32, [f32; 3]) {
 impl<const N: usize> ColorModel for Bands<N> {
     type Stored = Spectrum;
     type Texels = Vec<SpectralTexel>;
-    const TEXEL_BYTES: usize = size_of::<SpectralTexel>();
     /// nm; 0 in the lanes that are not in use.
     type Wavelengths = [f32; N];
     type Sample = Samples<N>;
@@ -208,6 +207,10 @@ impl<const N: usize> ColorModel for Bands<N> {
 
     fn evaluate_rgb(&self, rgb: [f32; 3], role: Role, wavelengths: &[f32; N]) -> Samples<N> {
         SpectralTexel::new(Table::shared(), rgb, role).evaluate(wavelengths)
+    }
+
+    fn texel_bytes(_pixels: &Pixels) -> usize {
+        size_of::<SpectralTexel>()
     }
 
     fn texels(&self, pixels: &Pixels, role: Role) -> Vec<SpectralTexel> {

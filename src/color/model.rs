@@ -51,8 +51,6 @@ pub trait ColorModel: Clone + std::fmt::Debug + Send + Sync + 'static {
     type Stored: Clone + std::fmt::Debug + Send + Sync;
     /// An image's colours, ready to be evaluated: small, for there are millions.
     type Texels: Clone + std::fmt::Debug + Send + Sync;
-    /// The most bytes of a texel.
-    const TEXEL_BYTES: usize;
     /// The wavelengths that one path carries.
     type Wavelengths: Copy + std::fmt::Debug + Send + Sync;
     /// One value for each of them.
@@ -95,6 +93,8 @@ pub trait ColorModel: Clone + std::fmt::Debug + Send + Sync + 'static {
         role: Role,
         wavelengths: &Self::Wavelengths,
     ) -> Self::Sample;
+    /// The most bytes that each of these takes in its stored form.
+    fn texel_bytes(pixels: &Pixels) -> usize;
     /// An image's texels in their stored form; reflectances are clamped to [0, 1].
     fn texels(&self, pixels: &Pixels, role: Role) -> Self::Texels;
     /// Texels, one a lane, at their paths' wavelengths; what is beyond the last is that.

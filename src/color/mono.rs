@@ -14,7 +14,6 @@ pub struct Mono;
 impl ColorModel for Mono {
     type Stored = f32;
     type Texels = Vec<f32>;
-    const TEXEL_BYTES: usize = size_of::<f32>();
     type Wavelengths = ();
     type Sample = Samples<1>;
     type Columns<F: Lanes> = Columns<F, 1>;
@@ -58,6 +57,10 @@ impl ColorModel for Mono {
             Role::Reflectance => value.clamp(0.0, 1.0),
             _ => value,
         }])
+    }
+
+    fn texel_bytes(_pixels: &Pixels) -> usize {
+        size_of::<f32>()
     }
 
     fn texels(&self, pixels: &Pixels, role: Role) -> Vec<f32> {

@@ -15,7 +15,6 @@ pub struct Rgb;
 impl ColorModel for Rgb {
     type Stored = [f32; 3];
     type Texels = Packed;
-    const TEXEL_BYTES: usize = size_of::<[f32; 3]>();
     type Wavelengths = ();
     type Sample = Samples<3>;
     type Columns<F: Lanes> = Columns<F, 3>;
@@ -80,6 +79,10 @@ impl ColorModel for Rgb {
             Role::Reflectance => rgb.map(|v| v.clamp(0.0, 1.0)),
             _ => rgb,
         })
+    }
+
+    fn texel_bytes(pixels: &Pixels) -> usize {
+        pixels.size()
     }
 
     fn texels(&self, pixels: &Pixels, role: Role) -> Packed {

@@ -21,6 +21,14 @@ impl Pixels {
         }
     }
 
+    /// Bytes of each.
+    pub fn size(&self) -> usize {
+        match self {
+            Self::Codes(..) => size_of::<u32>(),
+            Self::Linear(_) => size_of::<[f32; 3]>(),
+        }
+    }
+
     /// A texel's colour.
     ///
     /// # Panics

@@ -32,13 +32,16 @@ impl Picture {
             return Err(Error::input(message).at(&Location::of_file(path)));
         };
         let size = [image.width() as usize, image.height() as usize];
-        account.take_rows(size[0] * size[1], size_of::<[f32; 3]>())?;
+        let take = |bytes| account.take_rows(size[0] * size[1], bytes);
         let decode: fn(f32) -> f32 = match picture.encoding {
             Encoding::Srgb if !raw => srgb::decode,
             Encoding::Srgb | Encoding::Linear => |value| value,
         };
-        let coded = picture.encoding == Encoding::Srgb;
-        let codes = coded.then(|| codes(&image, rgb)).flatten();
+        let mut codes = None;
+        if picture.encoding == Encoding::Srgb {
+            take(size_of::<u32>())?;
+            codes = self::codes(&image, rgb);
+        }
         let finite = |value: f32| if value.is_finite() { value } else { 0.0 };
         let linear = |value| finite(decode(value));
         Ok(Self {
@@ -49,6 +52,7 @@ impl Picture {
                     Pixels::Codes(codes, Box::new(values))
                 }
                 None => {
+                    take(size_of::<[f32; 3]>())?;
                     Pixels::Linear(colors(&image, rgb).map(|color| color.map(linear)).collect())
                 }
             },
@@ -62,9 +66,10 @@ impl Picture {
     /// Where the budget does not allow it.
     pub fn into_texels<C: ColorModel>(self, color: &C, role: Role) -> Result<C::Texels> {
         let count = self.pixels.count();
-        self.account.take_rows(count, C::TEXEL_BYTES)?;
+        let bytes = C::texel_bytes(&self.pixels);
+        self.account.take_rows(count, bytes)?;
         let texels = color.texels(&self.pixels, role);
-        self.account.keep((count * C::TEXEL_BYTES) as u64);
+        self.account.keep((count * bytes) as u64);
         Ok(texels)
     }
 }
