@@ -3,7 +3,7 @@
 
 use rayon::prelude::*;
 
-use super::huge::Huge;
+use super::huge_pages::Huge;
 use super::node::{BLOCK, BLOCK_INDEX, Block, LEAF, Node, OTHER, OTHER_INDEX};
 use super::sketch::{Head, Sketch};
 use super::{Leaves, Tree};

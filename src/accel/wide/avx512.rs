@@ -6,7 +6,7 @@
 
 use std::arch::x86_64::*;
 
-use super::avx;
+use super::avx2;
 use super::kernel::{Ends, FILED, Lanes};
 use super::node::{Block, Entry, Node, OTHER};
 use super::state::State;
@@ -20,14 +20,14 @@ unsafe impl Lanes for Avx512 {
     #[inline(always)]
     unsafe fn aim(ray: &Ray, state: &mut State) {
         // SAFETY: the caller has AVX2 and FMA.
-        unsafe { avx::aim(ray, state) };
+        unsafe { avx2::aim(ray, state) };
     }
 
     #[inline(always)]
     unsafe fn enter(node: &Node, ray: &State, stack: *mut Entry) -> u32 {
         // SAFETY: the caller has the instructions and room for eight entries; an octant has three bits.
         unsafe {
-            let (near, far) = avx::slabs(node, ray);
+            let (near, far) = avx2::slabs(node, ray);
             let entered = _mm256_cmp_ps_mask::<_CMP_LE_OQ>(near, far);
             // Where a child is not entered, further than any bound.
             let near = _mm256_mask_mov_epi32(
@@ -98,7 +98,7 @@ unsafe impl Lanes for Avx512 {
     #[inline(always)]
     unsafe fn meet(block: &Block, ray: &State) -> (f32, usize) {
         // SAFETY: the caller has AVX2 and FMA.
-        unsafe { avx::meet(block, ray) }
+        unsafe { avx2::meet(block, ray) }
     }
 
     #[inline(always)]

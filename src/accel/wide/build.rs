@@ -13,7 +13,7 @@ use super::binary::binary;
 use super::chunks::{Chunks, chunks, most};
 use super::collapse::{Collapse, Plan};
 use super::crown::{Crown, Top, top};
-use super::curve::{self, Curved, curved};
+use super::morton::{self, Curved, curved};
 use crate::accel::Build;
 use crate::shape::Bounds;
 
@@ -35,7 +35,7 @@ pub(super) fn build_in(
         .into_par_iter()
         .map_init(PlocBuilder::new, |ploc, items| {
             let Curved { nodes, runs } = match work {
-                Build::Quick if items.len() <= curve::MOST => {
+                Build::Quick if items.len() <= morton::MOST => {
                     curved(boxes, &items, |item| leaves.is_triangle(item))
                 }
                 _ => Curved {

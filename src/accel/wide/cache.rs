@@ -3,7 +3,7 @@
 //!
 //! Its length and its hash are held against a file first, for files get damaged. The hash is of this version's and
 //! belongs to the items; who can forge it can also forge an image. But what is in a file is then shown to be
-//! [a tree](super::sound), and nodes are looked at only after they have been copied: whatever a file holds, and whoever
+//! [a tree](super::valid), and nodes are looked at only after they have been copied: whatever a file holds, and whoever
 //! writes to it meanwhile, no walk leaves the tree and none is without end.
 
 use std::fs::File;
@@ -12,9 +12,9 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
-use super::huge::Huge;
+use super::huge_pages::Huge;
 use super::node::{BLOCK_INDEX, Block, LEAF, Node};
-use super::{Leaves, Tree, sound};
+use super::{Leaves, Tree, valid};
 use crate::accel::{Build, CacheUse};
 use crate::error::Error;
 use crate::file::{leave, read_at, seal};
@@ -195,8 +195,8 @@ impl Entry {
         }
         let (others, _) = others.as_chunks();
         let others: Vec<u32> = others.iter().map(|o| u32::from_ne_bytes(*o)).collect();
-        let levels = sound::levels(&nodes, blocks.len(), others.len())
-            .filter(|_| sound::are_of(&blocks, &others, leaves))
+        let levels = valid::levels(&nodes, blocks.len(), others.len())
+            .filter(|_| valid::are_of(&blocks, &others, leaves))
             .ok_or_else(|| io::Error::other("its contents are no tree of these items"))?;
         let tree = Tree {
             nodes,

@@ -70,7 +70,7 @@ macro_rules! compile {
 }
 
 #[cfg(target_arch = "x86_64")]
-compile!(avx2, avx::Avx2, "avx2,fma,bmi1,bmi2,lzcnt,popcnt");
+compile!(avx2, avx2::Avx2, "avx2,fma,bmi1,bmi2,lzcnt,popcnt");
 #[cfg(target_arch = "x86_64")]
 compile!(
     avx512,

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use glam::Vec3;
 
-use super::huge::Huge;
+use super::huge_pages::Huge;
 use super::node::{BLOCK_INDEX, Block, Corners, DONE, LEAF, Node, Slabs, WIDTH};
 use super::{Later, Tree};
 

@@ -7,7 +7,7 @@
 
 mod assembly;
 #[cfg(target_arch = "x86_64")]
-mod avx;
+mod avx2;
 #[cfg(target_arch = "x86_64")]
 mod avx512;
 mod batch;
@@ -18,16 +18,16 @@ mod chunks;
 mod collapse;
 mod compiled;
 mod crown;
-mod curve;
-mod huge;
+mod huge_pages;
 mod kernel;
 mod later;
+mod morton;
 mod node;
 mod packet;
 mod portable;
 mod sketch;
-mod sound;
 mod state;
+mod valid;
 
 use std::ops::Range;
 use std::path::Path;
@@ -39,7 +39,7 @@ use super::{Build, CacheUse, Counts};
 use crate::interaction::Ray;
 use crate::lanes::Kernel;
 use crate::shape::Bounds;
-use huge::Huge;
+use huge_pages::Huge;
 use node::{Block, Corners, Node, Slabs};
 use state::Flight;
 

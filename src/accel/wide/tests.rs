@@ -110,7 +110,7 @@ fn every_kernel_takes_the_steps_that_plain_arithmetic_takes() {
     for kernel in Kernel::all() {
         let (said, lists) = match kernel.name() {
             #[cfg(target_arch = "x86_64")]
-            "AVX2" => (answers::<avx::Avx2>(), filed::<avx::Avx2>()),
+            "AVX2" => (answers::<avx2::Avx2>(), filed::<avx2::Avx2>()),
             #[cfg(target_arch = "x86_64")]
             "AVX-512" => (answers::<avx512::Avx512>(), filed::<avx512::Avx512>()),
             _ => continue,
