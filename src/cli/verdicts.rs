@@ -161,12 +161,12 @@ fn lines(crosscheck: &Crosscheck) -> Vec<(&'static str, String)> {
     lines
 }
 
-/// The ratio of times in words, before the times themselves.
+/// The ratio of Mitsuba's time to ours in words, before the times themselves.
 fn takes(ratio: Option<f64>) -> String {
     match ratio {
         None => String::new(),
-        Some(ratio) if ratio >= 1.0 => format!("takes {ratio:.1} times as long here: "),
-        Some(ratio) => format!("takes {:.1} times as long in Mitsuba: ", 1.0 / ratio),
+        Some(ratio) if ratio >= 1.0 => format!("takes {ratio:.1} times as long in Mitsuba: "),
+        Some(ratio) => format!("takes {:.1} times as long here: ", 1.0 / ratio),
     }
 }
 
