@@ -205,12 +205,12 @@ fn what_several_files_of_a_scene_take_is_added_up() {
         fs::write(folder.path().join("scene.xml"), scene).unwrap();
         let output = run(
             folder.path(),
-            "check scene.xml --memory-limit 45M --threads 1",
+            "check scene.xml --memory-limit 34M --threads 1",
         );
         let said = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(status), "{names:?}: {said}");
         assert_eq!(
-            said.contains("of the limit of 45.0 MB"),
+            said.contains("of the limit of 34.0 MB"),
             status == 1,
             "{said}"
         );
