@@ -161,7 +161,7 @@ impl Stacks {
                 found::<W, ANY, LATER>(walker, ray);
                 let start = walker.start(ray.ray as usize);
                 // SAFETY: the caller has what `L` needs.
-                unsafe { enter::<L>(ray, tree, &start) };
+                unsafe { enter::<L, LATER>(ray, tree, &start) };
             } else {
                 // SAFETY: what the ray is at was taken from its top.
                 let entry = unsafe { *self.start.add(ray.top as usize) };
@@ -183,7 +183,7 @@ impl Stacks {
                         unsafe {
                             *self.start.add(ray.top as usize) = EXIT;
                             ray.top += 1;
-                            enter::<L>(ray, inner, &start);
+                            enter::<L, LATER>(ray, inner, &start);
                         }
                         return;
                     }
@@ -256,7 +256,7 @@ fn found<'t, W: Walker<'t>, const ANY: bool, const LATER: bool>(walker: &mut W, 
 /// # Safety
 /// The processor has the instructions of `L`.
 #[inline(always)]
-unsafe fn begin<'t, L: Lanes, W: Walker<'t>>(
+unsafe fn begin<'t, L: Lanes, W: Walker<'t>, const LATER: bool>(
     walker: &W,
     index: usize,
     ray: &mut State,
@@ -265,7 +265,7 @@ unsafe fn begin<'t, L: Lanes, W: Walker<'t>>(
 ) {
     ray.begin(index as u32, bottom);
     // SAFETY: the caller's word.
-    unsafe { enter::<L>(ray, tree, &walker.start(index)) };
+    unsafe { enter::<L, LATER>(ray, tree, &walker.start(index)) };
 }
 
 /// Puts a ray at a tree's root, and aims it.
@@ -273,8 +273,11 @@ unsafe fn begin<'t, L: Lanes, W: Walker<'t>>(
 /// # Safety
 /// The processor has the instructions of `L`.
 #[inline(always)]
-unsafe fn enter<L: Lanes>(ray: &mut State, tree: &Tree, start: &Start) {
+unsafe fn enter<L: Lanes, const LATER: bool>(ray: &mut State, tree: &Tree, start: &Start) {
     ray.enter(tree, start);
+    if LATER {
+        ray.follow(tree, start);
+    }
     // SAFETY: the caller's word.
     unsafe { L::aim(&start.ray, ray) };
 }
@@ -315,7 +318,7 @@ pub(super) unsafe fn batch<
     let states = flight.states.as_mut_ptr();
     for (slot, state) in flight.states.iter_mut().enumerate().take(slots) {
         // SAFETY: the caller has what `L` needs.
-        unsafe { begin::<L, W>(walker, slot, state, tree, bottoms[slot]) };
+        unsafe { begin::<L, W, LATER>(walker, slot, state, tree, bottoms[slot]) };
         lists.nodes[0][slot] = slot as u32;
     }
     let (mut next, mut node_count, mut leaf_count) = (slots, slots, 0);
@@ -386,7 +389,7 @@ pub(super) unsafe fn batch<
                     if next == count {
                         continue;
                     }
-                    begin::<L, W>(walker, next, ray, tree, bottoms[slot as usize]);
+                    begin::<L, W, LATER>(walker, next, ray, tree, bottoms[slot as usize]);
                     next += 1;
                 }
                 *rest.add(ready) = slot;

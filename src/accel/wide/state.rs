@@ -183,6 +183,11 @@ impl State {
         self.id = start.best.id;
         self.entry = start.entry;
         self.instance = start.instance;
+    }
+
+    /// The same with where the tree goes, which batches without trees that move never look at.
+    #[inline(always)]
+    pub(super) fn follow(&mut self, tree: &Tree, start: &Start) {
         self.part = start.part;
         (self.later_nodes, self.later_blocks) = match &tree.later {
             Some(later) => (later.nodes.as_ptr(), later.blocks.as_ptr()),
