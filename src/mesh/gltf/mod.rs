@@ -1,12 +1,13 @@
 //! glTF 2.0, as JSON or GLB: the meshes of the default scene in world space with their colours, and the first camera.
-//! Morph targets stand at their default weights, skins at their nodes' places. Pictures, lights and animations are
-//! left out, with a warning for each kind. Texture coordinates are those of the base colour, with their origin at the
+//! Morph targets stand at their default weights, skins at their nodes' places, or both as the first animation has them at
+//! a time that is asked for. Pictures and lights are left out, and animations where no time is, with a warning for each kind. Texture coordinates are those of the base colour, with their origin at the
 //! top left, as Mitsuba's bitmaps have it, and stay as they are. A primitive without normals is flat, says the
 //! specification: its mesh has none. Under a mirroring transform the winding turns, so that the outside stays outside.
 
 mod json;
 
 mod accessor;
+mod animation;
 mod container;
 mod material;
 mod places;
@@ -137,6 +138,20 @@ pub fn read_gltf_camera(path: &Path) -> Result<Option<GltfCamera>> {
     camera().map_err(|why| Error::input(why).at(&Location::of_file(path)))
 }
 
+/// Whether the glTF or GLB file `path` has an animation; no mesh is read for it.
+///
+/// # Errors
+/// Where the file cannot be read or is malformed.
+pub fn gltf_is_animated(path: &Path) -> Result<bool> {
+    let bytes = with_input(path, |input| input.bytes())?;
+    let animated = || {
+        Ok(!Root::parse(Container::open(&bytes)?.json)?
+            .animations
+            .is_empty())
+    };
+    animated().map_err(|why: String| Error::input(why).at(&Location::of_file(path)))
+}
+
 /// All parts as one mesh, with their colours.
 pub(super) fn read(input: Input<'_>, options: &ReadOptions) -> Result<Decoded> {
     let walk = walk(input, options)?;
@@ -214,14 +229,22 @@ fn walk(input: Input<'_>, options: &ReadOptions) -> Result<Walk> {
     let bytes = input.bytes()?;
     let walked = || -> OrWhy<Walk> {
         let container = Container::open(&bytes)?;
-        let root = Root::parse(container.json)?;
+        let mut root = Root::parse(container.json)?;
         let mut walk = Walk::default();
+        let buffers = Buffers::load(&root, container.binary, path);
+        if let Some(time) = options.time {
+            let accessors = Accessors {
+                root: &root,
+                buffers: &buffers,
+            };
+            let changes = animation::changes(&accessors, time.seconds())?;
+            root.apply(changes);
+        }
         let stage = Stage::set(&root, &mut walk.notes)?;
         walk.camera = stage.camera;
-        if !root.animations.is_empty() {
+        if !root.animations.is_empty() && options.time.is_none() {
             (walk.notes).add("animations are left out: nodes and weights stand at rest");
         }
-        let buffers = Buffers::load(&root, container.binary, path);
         let accessors = Accessors {
             root: &root,
             buffers: &buffers,
