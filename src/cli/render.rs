@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use etendue::accel::{Build, Method};
 use etendue::budget::Budget;
 use etendue::compare::map::{Map, robust_top};
-use etendue::description::{self, Description};
+use etendue::description::{self, Description, Kind, Value};
 use etendue::display;
 use etendue::error::{Error, Problem, Result};
 use etendue::image;
@@ -347,6 +347,17 @@ impl Series<'_> {
             let posed = posed.get_or_insert_with(|| description.clone());
             orbit.place(posed, sensor);
         }
+        if let Some(times) = self.moments(item, shutter)? {
+            let posed = posed.get_or_insert_with(|| description.clone());
+            let root = posed.root().node_id();
+            let shapes = posed.children_of(root, Kind::Shape);
+            let animated = shapes
+                .iter()
+                .find(|shape| posed.node(**shape).plugin() == "gltf");
+            if let Some(shape) = animated {
+                posed.set(*shape, "times", Value::String(times));
+            }
+        }
         let seen = posed.as_ref().unwrap_or(&description);
         let mut rendered = self.session.render(seen, options, bar);
         if let (Some(path), Ok(_), false) = (&item.heatmap, &rendered, bar.stop()) {
@@ -357,6 +368,29 @@ impl Series<'_> {
             self.read = Some((item.input.clone(), as_read, description));
         }
         rendered
+    }
+
+    /// When a bare glTF file's animation is looked at, as `times` are written; `None` where it has none, or nobody asks
+    /// for a time.
+    fn moments(&self, item: &Item, shutter: Option<(f64, f64)>) -> Result<Option<String>> {
+        /// Sets of vertices while a shutter is open.
+        const SETS: usize = 5;
+        let extension = etendue::mesh::extension(&item.input);
+        let asked = item.frame.is_some() && self.arguments.turntable.is_none() || shutter.is_some();
+        if !asked || !matches!(extension.as_str(), "gltf" | "glb") {
+            return Ok(None);
+        }
+        if !etendue::mesh::gltf_is_animated(&item.input, &self.budget)? {
+            return Ok(None);
+        }
+        let time = item.frame.unwrap_or(0) as f64 / self.arguments.image.fps();
+        let (open, close) = shutter.unwrap_or((time, time));
+        let at = |set: usize| (open + (close - open) * set as f64 / (SETS - 1) as f64) as f32;
+        let times: Vec<f32> = (0..SETS).map(at).collect();
+        let ascend = times.windows(2).all(|pair| pair[0] < pair[1]);
+        let times = if ascend { &times[..] } else { &times[..1] };
+        let texts: Vec<String> = times.iter().map(f32::to_string).collect();
+        Ok(Some(texts.join(", ")))
     }
 
     /// Draws the picture of node steps, unless stopped.

@@ -132,19 +132,22 @@ impl<C: ColorModel> Emitter<C> for Area<C> {
             None => from.position,
         };
         let point = self.draw(own, u)?;
-        let way = point.position - own;
-        // Which side emits is the same in the shape's own space as in the world.
-        if way.dot(point.normal) >= 0.0 {
-            return None;
-        }
-        let (target, pdf) = match &to_world {
-            Some(to_world) => {
-                let pdf = point.pdf * solid_angle_ratio(to_world, way);
-                (to_world.point(point.position), pdf)
-            }
-            None => (point.position, point.pdf),
+        let target = match &to_world {
+            Some(to_world) => to_world.point(point.position),
+            None => point.position,
         };
         let direction = (target - from.position).normalize_or_zero();
+        // Which side emits is the same in the shape's own space as in the world.
+        let (toward, pdf) = match &to_world {
+            Some(to_world) => {
+                let way = point.position - own;
+                (way, point.pdf * solid_angle_ratio(to_world, way))
+            }
+            None => (direction, point.pdf),
+        };
+        if toward.dot(point.normal) >= 0.0 {
+            return None;
+        }
         let radiance = match &self.radiance {
             Texture::Uniform(radiance) => C::evaluate(radiance.value(), wavelengths),
             texture => texture.eval(&interaction(&self.shape, &point), wavelengths),

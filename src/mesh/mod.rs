@@ -38,12 +38,14 @@ pub use generate::{
     Bumps, add_bumps, ball, block, bumpy_sphere, cube, flake, flake_balls, flake_scene, grid, hair,
     menger, menger_triangles, rectangle, sphere, terrain,
 };
-pub use gltf::{GltfCamera, GltfPart, GltfScene, Projection, read_gltf, read_gltf_camera};
+pub use gltf::{
+    GltfCamera, GltfPart, GltfScene, Projection, gltf_is_animated, read_gltf, read_gltf_camera,
+};
 pub use mtl::BARE_COLOR;
 pub use parts::{Part, Parts, read_parts};
 pub use ply::{check_writable, write_ply, write_text};
 pub(crate) use polygon::triangulate;
-pub use read::{FORMATS, Format, Loaded, MeshFile, ReadMesh, ReadOptions, extension, read};
+pub use read::{FORMATS, Format, Loaded, MeshFile, ReadMesh, ReadOptions, Time, extension, read};
 pub(crate) use read::{contents, is_compressed};
 pub use refine::TooMany;
 pub use report::Report;

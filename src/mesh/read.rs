@@ -32,6 +32,24 @@ pub struct ReadOptions {
     /// polygons covered as they are, concave or not, and coordinates that are far from the origin counted from a
     /// nearer one.
     pub bare: bool,
+    /// When the first animation of a glTF file is looked at; `None`: nodes and weights stand at rest.
+    pub time: Option<Time>,
+}
+
+/// A time in seconds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Time(u32);
+
+impl Time {
+    /// So many seconds.
+    pub fn of(seconds: f32) -> Self {
+        Self(seconds.to_bits())
+    }
+
+    /// How many.
+    pub fn seconds(self) -> f32 {
+        f32::from_bits(self.0)
+    }
 }
 
 impl ReadOptions {
@@ -41,6 +59,7 @@ impl ReadOptions {
         shape_index: 0,
         materials: false,
         bare: true,
+        time: None,
     };
 }
 

@@ -9,7 +9,7 @@ use crate::description::Properties;
 use crate::error::{Problem, Result};
 use crate::interaction::{Hit, Interaction, Ray};
 use crate::math::Frame;
-use crate::mesh::Mesh;
+use crate::mesh::{Mesh, Time};
 
 /// A mesh with its vertices at two times or more.
 #[derive(Debug)]
@@ -277,57 +277,89 @@ pub(super) fn file_name(number: usize) -> String {
 
 const STEM: &str = "filename_";
 
-/// The times of the vertices in `filename` and those after it, two at least; `None` where there is nothing after it.
-pub(super) fn times(properties: &Properties<'_>) -> Result<Option<Vec<f32>>> {
-    let numbered = properties
-        .all()
-        .iter()
-        .filter(|p| p.name.starts_with(STEM))
-        .count();
-    let count = 1 + (1..).take_while(|i| properties.has(&file_name(*i))).count();
-    if numbered >= count {
-        let missing = file_name(count);
-        let message = format!("there is no {missing:?}, and there are files with other numbers");
-        return Err(properties
-            .error("filename", message)
-            .help("number them from 1 without a gap"));
-    }
-    let given = properties.given::<&str>("times")?;
-    if count == 1 {
-        return match given {
-            None => Ok(None),
-            Some(_) => Err(properties
+/// From what a mesh comes.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Sets {
+    /// A file.
+    One,
+    /// A file for each of these times, two at least.
+    Files(Vec<f32>),
+    /// A file with an animation, which is looked at at these times, one at least.
+    Animation(Vec<f32>),
+}
+
+impl Sets {
+    /// What the properties of a mesh from a file say.
+    pub(super) fn of(properties: &Properties<'_>) -> Result<Self> {
+        let numbered = properties
+            .all()
+            .iter()
+            .filter(|p| p.name.starts_with(STEM))
+            .count();
+        let count = 1 + (1..).take_while(|i| properties.has(&file_name(*i))).count();
+        if numbered >= count {
+            let missing = file_name(count);
+            let message =
+                format!("there is no {missing:?}, and there are files with other numbers");
+            return Err(properties
+                .error("filename", message)
+                .help("number them from 1 without a gap"));
+        }
+        let animated = properties.plugin() == "gltf" && count == 1;
+        let Some(text) = properties.given::<&str>("times")? else {
+            let last = (count - 1) as f32;
+            return Ok(match count {
+                1 => Self::One,
+                _ => Self::Files((0..count).map(|i| i as f32 / last).collect()),
+            });
+        };
+        if count == 1 && !animated {
+            return Err(properties
                 .error(
                     "times",
                     "times are those of several files, and there is one",
                 )
-                .help("add \"filename_1\"")),
-        };
+                .help("add \"filename_1\""));
+        }
+        let numbers = text.split(|c: char| c == ',' || c.is_whitespace());
+        let numbers = numbers.filter(|number| !number.is_empty());
+        let times: Option<Vec<f32>> = numbers.map(|number| number.parse().ok()).collect();
+        let times = times.filter(|times| !times.is_empty()).ok_or_else(|| {
+            let error = properties.error("times", format!("{text:?} are no numbers"));
+            error.help("write them as 0, 0.5, 1")
+        })?;
+        if times.len() != count && !animated {
+            let message = format!("{} times for {count} files", times.len());
+            return Err(properties.error("times", message));
+        }
+        let ascend = times
+            .windows(2)
+            .all(|pair| pair[0] < pair[1] && (pair[1] - pair[0]).is_finite());
+        if !(ascend && times.iter().all(|time| time.is_finite())) {
+            let message = "times must be finite, and each after the one before";
+            return Err(properties.error("times", message));
+        }
+        Ok(match animated {
+            true => Self::Animation(times),
+            false => Self::Files(times),
+        })
     }
-    let Some(text) = given else {
-        let last = (count - 1) as f32;
-        return Ok(Some((0..count).map(|i| i as f32 / last).collect()));
-    };
-    let numbers = text.split(|c: char| c == ',' || c.is_whitespace());
-    let numbers = numbers.filter(|number| !number.is_empty());
-    let times: Option<Vec<f32>> = numbers.map(|number| number.parse().ok()).collect();
-    let times = times.ok_or_else(|| {
-        let error = properties.error("times", format!("{text:?} are no numbers"));
-        error.help("write them as 0, 0.5, 1")
-    })?;
-    if times.len() != count {
-        let message = format!("{} times for {count} files", times.len());
-        return Err(properties.error("times", message));
+
+    /// When an animation is looked at first.
+    pub(super) fn first_time(&self) -> Option<Time> {
+        match self {
+            Self::Animation(times) => times.first().map(|time| Time::of(*time)),
+            _ => None,
+        }
     }
-    let ascend = times
-        .windows(2)
-        .all(|pair| pair[0] < pair[1] && (pair[1] - pair[0]).is_finite());
-    match ascend && times.iter().all(|time| time.is_finite()) {
-        true => Ok(Some(times)),
-        false => Err(properties.error(
-            "times",
-            "times must be finite, and each after the one before",
-        )),
+
+    /// Whether the mesh deforms.
+    pub(super) fn deform(&self) -> bool {
+        match self {
+            Self::One => false,
+            Self::Files(_) => true,
+            Self::Animation(times) => times.len() > 1,
+        }
     }
 }
 
@@ -347,8 +379,13 @@ pub(super) fn joined(
         }
     }
     let mesh = DeformingMesh::new(meshes, times).map_err(|(number, why)| {
-        let error = properties.error(&file_name(number), why.to_string());
-        error.help("all files of a mesh that deforms have the same triangles")
+        // Of an animation there are times in place of files.
+        let name = match properties.has(&file_name(number)) {
+            true => file_name(number),
+            false => "times".to_owned(),
+        };
+        let error = properties.error(&name, why.to_string());
+        error.help("a mesh that deforms has the same triangles at all times")
     })?;
     Ok(Shape {
         geometry: Geometry::Deforming(mesh),

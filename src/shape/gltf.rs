@@ -1,6 +1,8 @@
 //! `gltf`: the default scene of a glTF or GLB file `filename` as one mesh, with `to_world`, `face_normals`,
 //! `flip_normals` and `flip_tex_coords`; the materials' base colours are its attribute `face_color`, or where the file
-//! has colours of vertices `vertex_color`. Without normals it is flat. Étendue's own: Mitsuba has no such shape.
+//! has colours of vertices `vertex_color`. Without normals it is flat. With `times` and no other file it deforms as the
+//! file's first animation says: it is looked at at each of these times, in seconds. Étendue's own: Mitsuba has no such
+//! shape.
 
 use crate::description::Properties;
 use crate::description::declared::Plugin;
@@ -12,6 +14,9 @@ pub(super) const PLUGIN: Plugin = Plugin {
     properties: &[super::COMMON, super::MESH, super::FILE],
 };
 
-pub(super) fn options(_properties: &Properties<'_>) -> Result<ReadOptions> {
-    Ok(ReadOptions::default())
+pub(super) fn options(properties: &Properties<'_>) -> Result<ReadOptions> {
+    Ok(ReadOptions {
+        time: super::deforming::Sets::of(properties)?.first_time(),
+        ..ReadOptions::default()
+    })
 }

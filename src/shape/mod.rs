@@ -35,7 +35,8 @@ use crate::family;
 use crate::interaction::{Hit, Interaction, Ray, offset};
 use crate::lanes::{self, Lanes, Mask as _};
 use crate::math::{Moving, Transform};
-use crate::mesh::{Loaded, Mesh, MeshFile, ReadOptions, read};
+use crate::mesh::{Loaded, Mesh, MeshFile, ReadOptions, Time, read};
+use deforming::Sets;
 
 pub use deforming::{DeformingMesh, Moment};
 pub use disk::Disk;
@@ -540,26 +541,32 @@ fn from_file(loaded: Loaded, properties: &Properties<'_>, setting: &Setting<'_>)
     let Some(Build::Read(options)) = single(properties) else {
         return Ok(shape);
     };
-    let Some(times) = deforming::times(properties)? else {
+    let sets = Sets::of(properties)?;
+    let (Sets::Files(times) | Sets::Animation(times)) = &sets else {
         return Ok(shape);
     };
+    if !sets.deform() {
+        return Ok(shape);
+    }
     let mut shapes = vec![shape];
-    for number in 1..times.len() {
-        let name = deforming::file_name(number);
-        let file = MeshFile {
-            path: properties.file(&name)?,
-            ..mesh::file(properties, options(properties)?)?
-        };
+    for (number, time) in times.iter().enumerate().skip(1) {
+        let mut file = mesh::file(properties, options(properties)?)?;
+        match &sets {
+            Sets::Animation(_) => file.options.time = Some(Time::of(*time)),
+            _ => file.path = properties.file(&deforming::file_name(number))?,
+        }
         let loaded = read(&file.path, &file.options, properties.budget());
         let loaded = loaded.map_err(|e| e.named_at(properties.location()))?;
         shapes.push(mesh::place_file(loaded, properties, setting)?);
     }
-    deforming::joined(shapes, times, properties)
+    deforming::joined(shapes, times.clone(), properties)
 }
 
 /// Whether the shape deforms, so that it has to stand in a group of its own.
 pub(crate) fn deforms(properties: &Properties<'_>) -> bool {
-    properties.has(&deforming::file_name(1))
+    let from_file = matches!(single(properties), Some(Build::Read(_)));
+    // What is wrong is told where the shape is built.
+    from_file && Sets::of(properties).is_ok_and(|sets| sets.deform())
 }
 
 /// The property `to_world`, the identity by default, and then `outer`.

@@ -563,6 +563,106 @@ fn half_a_turn_between_keyframes_is_warned_of() {
     );
 }
 
+/// A square that an animation carries from x = −3 to x = 3 in a second, as glTF.
+fn carried(folder: &Path) {
+    let corners = [
+        -0.5, -0.5, 0.0, 0.5, -0.5, 0.0, 0.5, 0.5, 0.0, -0.5, 0.5, 0.0,
+    ];
+    let numbers = corners
+        .iter()
+        .chain(&[0.0, 1.0])
+        .chain(&[-3.0, 0.0, 0.0, 3.0, 0.0, 0.0]);
+    let mut bytes: Vec<u8> = numbers.flat_map(|x: &f32| x.to_le_bytes()).collect();
+    bytes.extend([0, 1, 2, 0, 2, 3]);
+    fs::write(folder.join("square.bin"), &bytes).unwrap();
+    let view = |offset: u32, length: u32| {
+        format!(r#"{{"buffer":0,"byteOffset":{offset},"byteLength":{length}}}"#)
+    };
+    let accessor = |view: u32, kind: u32, count: u32, shape: &str| {
+        format!(
+            r#"{{"bufferView":{view},"componentType":{kind},"count":{count},"type":"{shape}"}}"#
+        )
+    };
+    let text = format!(
+        r#"{{"asset":{{"version":"2.0"}},"scenes":[{{"nodes":[0]}}],"nodes":[{{"mesh":0}}],
+        "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}},"indices":3}}]}}],
+        "animations":[{{"channels":[{{"sampler":0,"target":{{"node":0,"path":"translation"}}}}],
+            "samplers":[{{"input":1,"output":2}}]}}],
+        "accessors":[{},{},{},{}],"bufferViews":[{},{},{},{}],
+        "buffers":[{{"byteLength":{},"uri":"square.bin"}}]}}"#,
+        accessor(0, 5126, 4, "VEC3"),
+        accessor(1, 5126, 2, "SCALAR"),
+        accessor(2, 5126, 2, "VEC3"),
+        accessor(3, 5121, 6, "SCALAR"),
+        view(0, 48),
+        view(48, 8),
+        view(56, 24),
+        view(80, 6),
+        bytes.len()
+    );
+    fs::write(folder.join("square.gltf"), text).unwrap();
+}
+
+/// A square of area 1 that crosses a window of area 4 covers it for its area times the window's width over its way, and
+/// in the rows that it passes for 1/6 of the time.
+#[test]
+fn an_animation_of_a_file_is_seen_for_the_time_it_takes() {
+    let folder = tempfile::tempdir().unwrap();
+    carried(folder.path());
+    let text = scene(&format!(
+        r#"<integrator type="aov"><string name="aovs" value="s:shape_index"/></integrator>{}
+        <shape type="gltf"><string name="filename" value="square.gltf"/><string name="times" value="0, 0.3, 1"/></shape>"#,
+        window(16, 256)
+    ));
+    let path = folder.path().join("scene.xml");
+    let description = Description::parse(&text, &path, &ReadOptions::default()).unwrap();
+    let rendered =
+        render(&description, &Options::default(), &Silent).unwrap_or_else(|e| panic!("{e}"));
+    let image = rendered.image;
+    let place = image
+        .channels()
+        .iter()
+        .position(|c| c == "s.I")
+        .expect("the channel");
+    let values = channel(&image, place);
+    let row = |row: usize| Mean::of(values[16 * row..16 * (row + 1)].iter().copied());
+    row(8).assert_is(1.0 / 6.0, 0.03, "inside");
+    assert_eq!(row(1).value, 0.0);
+    // As a bare file, frame after frame.
+    let run = |arguments: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_etendue"));
+        let command = command
+            .current_dir(folder.path())
+            .args(["render", "square.gltf", "-q"]);
+        let output = command
+            .args(["--size", "24x16", "--spp", "2"])
+            .args(arguments)
+            .output()
+            .unwrap();
+        assert!(
+            output.status.success(),
+            "{}",
+            String::from_utf8_lossy(&output.stderr)
+        );
+    };
+    run(&["-o", "s-{frame}.png", "--frames", "0:3", "--fps", "2"]);
+    run(&[
+        "-o",
+        "b-{frame}.png",
+        "--frames",
+        "0:2",
+        "--fps",
+        "2",
+        "--shutter",
+        "180",
+    ]);
+    let read = |name: &str| fs::read(folder.path().join(name)).unwrap();
+    let images = ["s-0.png", "s-1.png", "s-2.png", "b-0.png", "b-1.png"].map(read);
+    for (i, image) in images.iter().enumerate() {
+        assert!(images[..i].iter().all(|other| other != image), "{i}");
+    }
+}
+
 /// What animated scenes come to where nothing of them moves: in a profile, in a folder of trees, as a mesh's report.
 #[test]
 fn other_commands_take_scenes_that_move() {

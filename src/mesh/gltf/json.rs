@@ -24,7 +24,7 @@ pub(super) struct Root<'a> {
     pub(super) materials: Vec<Material>,
     pub(super) cameras: Vec<Camera>,
     pub(super) skins: Vec<Skin>,
-    pub(super) animations: Vec<IgnoredAny>,
+    pub(super) animations: Vec<Animation>,
     pub(super) accessors: Vec<Accessor>,
     pub(super) buffer_views: Vec<BufferView>,
     #[serde(borrow)]
@@ -187,6 +187,36 @@ pub(super) struct Orthographic {
     pub(super) ymag: f64,
     pub(super) znear: f64,
     pub(super) zfar: f64,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(default)]
+pub(super) struct Animation {
+    pub(super) channels: Vec<Channel>,
+    pub(super) samplers: Vec<Sampler>,
+}
+
+#[derive(Deserialize)]
+pub(super) struct Channel {
+    pub(super) sampler: usize,
+    pub(super) target: Target,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(default)]
+pub(super) struct Target {
+    pub(super) node: Option<usize>,
+    /// `translation`, `rotation`, `scale` or `weights`; others are passed over.
+    pub(super) path: String,
+}
+
+#[derive(Deserialize)]
+pub(super) struct Sampler {
+    /// An accessor of times in seconds.
+    pub(super) input: usize,
+    /// An accessor of values.
+    pub(super) output: usize,
+    pub(super) interpolation: Option<String>,
 }
 
 #[derive(Deserialize)]

@@ -1,12 +1,13 @@
 //! glTF 2.0, as JSON or GLB: the meshes of the default scene in world space with their colours, and the first camera.
-//! Morph targets stand at their default weights, skins at their nodes' places. Pictures, lights and animations are
-//! left out, with a warning for each kind. Texture coordinates are those of the base colour, with their origin at the
+//! Morph targets stand at their default weights, skins at their nodes' places, or both as the first animation has them at
+//! a time that is asked for. Pictures and lights are left out, and animations where no time is, with a warning for each kind. Texture coordinates are those of the base colour, with their origin at the
 //! top left, as Mitsuba's bitmaps have it, and stay as they are. A primitive without normals is flat, says the
 //! specification: its mesh has none. Under a mirroring transform the winding turns, so that the outside stays outside.
 
 mod json;
 
 mod accessor;
+mod animation;
 mod container;
 mod material;
 mod places;
@@ -150,6 +151,21 @@ fn take_tree(json: &[u8], account: &Account) -> OrWhy<()> {
     account.take(bytes as u64).map_err(|e| e.to_string())
 }
 
+/// Whether the glTF or GLB file `path` has an animation; no mesh is read for it.
+///
+/// # Errors
+/// Where the file cannot be read, is malformed or larger than the budget allows.
+pub fn gltf_is_animated(path: &Path, budget: &Budget) -> Result<bool> {
+    let account = budget.open();
+    let bytes = with_input(path, &account, |input| input.bytes())?;
+    let animated = || -> OrWhy<bool> {
+        let container = Container::open(&bytes)?;
+        take_tree(container.json, &account)?;
+        Ok(!Root::parse(container.json)?.animations.is_empty())
+    };
+    animated().map_err(|why| Error::input(why).at(&Location::of_file(path)))
+}
+
 /// All parts as one mesh, with their colours.
 pub(super) fn read(input: Input<'_>, options: &ReadOptions) -> Result<Decoded> {
     let walk = walk(input, options)?;
@@ -228,14 +244,23 @@ fn walk(input: Input<'_>, options: &ReadOptions) -> Result<Walk> {
     let walked = || -> OrWhy<Walk> {
         let container = Container::open(&bytes)?;
         take_tree(container.json, account)?;
-        let root = Root::parse(container.json)?;
+        let mut root = Root::parse(container.json)?;
         let mut walk = Walk::default();
+        let buffers = Buffers::load(&root, container.binary, path, account);
+        if let Some(time) = options.time {
+            let accessors = Accessors {
+                root: &root,
+                buffers: &buffers,
+                account,
+            };
+            let changes = animation::changes(&accessors, time.seconds())?;
+            root.apply(changes);
+        }
         let stage = Stage::set(&root, &mut walk.notes)?;
         walk.camera = stage.camera;
-        if !root.animations.is_empty() {
+        if !root.animations.is_empty() && options.time.is_none() {
             (walk.notes).add("animations are left out: nodes and weights stand at rest");
         }
-        let buffers = Buffers::load(&root, container.binary, path, account);
         let accessors = Accessors {
             root: &root,
             buffers: &buffers,

@@ -694,3 +694,103 @@ fn every_index_is_held_against_what_it_indexes() {
         );
     }
 }
+
+/// A rectangle whose node is moved, turned, stretched and bent by an animation, each in its own way between keyframes.
+#[test]
+fn an_animation_stands_where_it_is_at_a_time() {
+    let mut document = Document::rectangle();
+    let lifted = json!({"componentType": 5126, "count": 4, "type": "VEC3"});
+    let lifted = document.accessor(&f32s(&[0., 0., 1.].repeat(4)), lifted);
+    document.primitive()["targets"] = json!([{"POSITION": lifted}]);
+    let mut keys = |numbers: &[f32], kind: &str, width: usize| {
+        let about = json!({"componentType": 5126, "count": numbers.len() / width, "type": kind});
+        document.accessor(&f32s(numbers), about)
+    };
+    let times = keys(&[1.0, 3.0], "SCALAR", 1);
+    let half = std::f32::consts::FRAC_1_SQRT_2;
+    let translation = keys(&[0., 0., 0., 4., 0., 0.], "VEC3", 3);
+    let rotation = keys(&[0., 0., 0., 1., 0., 0., half, half], "VEC4", 4);
+    let scale = keys(&[1., 1., 1., 3., 1., 1.], "VEC3", 3);
+    // In-tangent, value and out-tangent of each of two keyframes.
+    let weights = keys(&[0., 0., 1., 0., 1., 0.], "SCALAR", 1);
+    let channel =
+        |sampler: u32, path: &str| json!({"sampler": sampler, "target": {"node": 0, "path": path}});
+    let sampler = |output: usize, between: &str| json!({"input": times, "output": output, "interpolation": between});
+    document.json["animations"] = json!([{
+        "channels": [channel(0, "translation"), channel(1, "rotation"), channel(2, "scale"), channel(3, "weights"),
+            {"sampler": 0, "target": {"path": "pointer"}}],
+        "samplers": [{"input": times, "output": translation}, sampler(rotation, "LINEAR"), sampler(scale, "STEP"),
+            sampler(weights, "CUBICSPLINE")]}]);
+    let corner = |time: Option<f32>| {
+        let options = ReadOptions {
+            time: time.map(crate::mesh::Time::of),
+            ..ReadOptions::default()
+        };
+        let read = decode("test.gltf", &document.text(), &options);
+        read.unwrap().mesh.positions[1]
+    };
+    let near = |time: Option<f32>, expected: Vec3| {
+        let found = corner(time);
+        assert!(
+            found.distance(expected) < 1e-5,
+            "{time:?}: {found} {expected}"
+        );
+    };
+    // Corner 1 is at (2, 0, 0).
+    near(None, Vec3::new(2.0, 0.0, 0.0));
+    near(Some(0.0), Vec3::new(2.0, 0.0, 0.0));
+    // Half way: moved by 2, turned by 45°, not yet stretched; half of the weight and an eighth of twice a slope of 1.
+    near(
+        Some(2.0),
+        Vec3::new(2.0 + 2.0 * half, 2.0 * half, 0.5 + 0.25),
+    );
+    near(Some(9.0), Vec3::new(4.0, 6.0, 1.0));
+}
+
+#[test]
+fn an_animation_that_is_none_is_told() {
+    let mut document = Document::rectangle();
+    let about = json!({"componentType": 5126, "count": 2, "type": "SCALAR"});
+    let times = document.accessor(&f32s(&[0.0, 1.0]), about.clone());
+    let channel = json!({"sampler": 0, "target": {"node": 0, "path": "weights"}});
+    let with = |document: &mut Document, channel: Value, sampler: Value| {
+        document.json["animations"] = json!([{"channels": [channel], "samplers": [sampler]}]);
+        let options = ReadOptions {
+            time: Some(crate::mesh::Time::of(0.5)),
+            ..ReadOptions::default()
+        };
+        let read = decode("test.gltf", &document.text(), &options);
+        read.unwrap_err().to_string()
+    };
+    let sampler = json!({"input": times, "output": times});
+    for (channel, sampler, says) in [
+        (
+            json!({"sampler": 7, "target": {"node": 0, "path": "scale"}}),
+            sampler.clone(),
+            "sampler 7",
+        ),
+        (
+            json!({"sampler": 0, "target": {"node": 9, "path": "scale"}}),
+            sampler.clone(),
+            "node 9",
+        ),
+        (
+            json!({"sampler": 0, "target": {"node": 0, "path": "scale"}}),
+            sampler.clone(),
+            "3 components",
+        ),
+        (
+            channel.clone(),
+            json!({"input": times, "output": times, "interpolation": "CUBICSPLINE"}),
+            "are no animation",
+        ),
+        (
+            channel,
+            json!({"input": times, "output": times, "interpolation": "WAVE"}),
+            "\"WAVE\" is unknown",
+        ),
+    ] {
+        let error = with(&mut document, channel, sampler);
+        assert!(error.contains(says), "{error}");
+    }
+}
