@@ -612,7 +612,7 @@ fn an_animation_of_a_file_is_seen_for_the_time_it_takes() {
     let text = scene(&format!(
         r#"<integrator type="aov"><string name="aovs" value="s:shape_index"/></integrator>{}
         <shape type="gltf"><string name="filename" value="square.gltf"/><string name="times" value="0, 0.3, 1"/></shape>"#,
-        window(16, 256)
+        window(16, 1024)
     ));
     let path = folder.path().join("scene.xml");
     let description = Description::parse(&text, &path, &ReadOptions::default()).unwrap();
