@@ -9,6 +9,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use etendue::accel::{Counts, Instance, Method, Order, Tracer};
+use etendue::budget::Budget;
 use etendue::interaction::{Hit, Ray};
 use etendue::lanes::warp;
 use etendue::math::{Moving, random};
@@ -31,7 +32,7 @@ fn load() -> Mesh {
         .find(|argument| !argument.starts_with('-'));
     let mut mesh = match &file {
         Some(file) => {
-            let read = mesh::read(Path::new(file), &ReadOptions::default());
+            let read = mesh::read(Path::new(file), &ReadOptions::default(), &Budget::default());
             read.unwrap_or_else(|e| panic!("{e}")).mesh
         }
         None => mesh::bumpy_sphere(7, 1),
