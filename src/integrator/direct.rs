@@ -6,13 +6,13 @@
 use super::bounce::Bounces;
 use super::limits;
 use super::mis::power;
-use super::wave::{Block, Contribution, Outcome, Shading, Wave, Ways};
+use super::wave::{Block, Outcome, Shading, Wave, Ways};
 use super::{Context, Cost, Estimate, Estimates, Estimator, Start};
-use crate::color::{ColorModel, Spectral as _};
+use crate::color::{ColorModel, Spectra as _, Spectral as _};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, integer};
 use crate::error::Result;
-use crate::lanes::{Lanes, MAX_LANES};
+use crate::lanes::{Lanes, MAX_LANES, Mask as _};
 use crate::sampler::Sampler;
 use crate::scene::Scene;
 
@@ -22,6 +22,13 @@ pub struct Direct {
     emitter_samples: u32,
     bsdf_samples: u32,
     hide_emitters: bool,
+}
+
+/// A light sample whose visibility is still to be asked.
+#[derive(Clone, Copy, Debug)]
+struct Shadow<S> {
+    contribution: S,
+    slot: u32,
 }
 
 /// About how many samples of a kind are in memory at once.
@@ -114,7 +121,7 @@ impl<C: ColorModel> Estimator<C> for Direct {
 impl Direct {
     fn estimate_part<C: ColorModel>(
         &self,
-        mut wave: Wave<'_, C, Contribution<C::Sample>>,
+        mut wave: Wave<'_, C, Shadow<C::Sample>>,
         estimates: &mut [Estimate<C::Sample>],
         cost: &mut Cost,
     ) {
@@ -133,8 +140,8 @@ impl Direct {
             return;
         };
         let mut bounce = Bounce(self);
-        let light = |_: &mut Bounce<'_>, shadow: &Contribution<C::Sample>| {
-            shadow.add_to(estimates);
+        let light = |_: &mut Bounce<'_>, shadow: &Shadow<C::Sample>| {
+            estimates[shadow.slot as usize].radiance += shadow.contribution;
         };
         wave.shade(first, self.emitter_samples, &mut bounce, light, cost);
         wave.trace(1, false, cost);
@@ -146,7 +153,7 @@ impl Direct {
 struct Bounce<'a>(&'a Direct);
 
 impl<C: ColorModel> Shading<C> for Bounce<'_> {
-    type Shadow = Contribution<C::Sample>;
+    type Shadow = Shadow<C::Sample>;
 
     #[inline(always)]
     fn shade<F: Lanes>(&mut self, block: &Block<'_, C, F>, out: &mut Outcome<'_, C, Self::Shadow>) {
@@ -168,7 +175,7 @@ impl Bounce<'_> {
         &self,
         block: &Block<'_, C, F>,
         decision: u32,
-        out: &mut Outcome<'_, C, Contribution<C::Sample>>,
+        out: &mut Outcome<'_, C, Shadow<C::Sample>>,
     ) {
         let numbers = block.decisions(decision);
         let (u2, u1) = (numbers.u2::<F>(), numbers.u1::<F>());
@@ -181,7 +188,15 @@ impl Bounce<'_> {
         let count = F::splat(self.0.emitter_samples as f32);
         let weight = power(light.pdf * light_share, other) / (light.pdf * count);
         let contribution = block.throughput * value.value * light.radiance * weight;
-        out.light(block, &light, contribution);
+        let lit = at.active & F::zero().lt(light.pdf) & !contribution.is_black();
+        if !lit.any() {
+            return;
+        }
+        let contributions = contribution.rows();
+        out.ask(block, &light, lit, |lane| Shadow {
+            contribution: C::Columns::<F>::of(&contributions, lane),
+            slot: block.walker(lane).slot,
+        });
     }
 
     /// Looks for light where the material scatters to.
@@ -190,7 +205,7 @@ impl Bounce<'_> {
         &self,
         block: &Block<'_, C, F>,
         decision: u32,
-        out: &mut Outcome<'_, C, Contribution<C::Sample>>,
+        out: &mut Outcome<'_, C, Shadow<C::Sample>>,
     ) {
         let numbers = block.decisions(decision);
         let (u2, u1) = (numbers.u2::<F>(), numbers.u1::<F>());

@@ -6,9 +6,9 @@
 use super::bounce::Bounces;
 use super::limits::{self, Limits};
 use super::mis::power;
-use super::wave::{Block, Contribution, Outcome, Shading, Wave, Ways};
+use super::wave::{Block, Outcome, Shading, Wave, Ways};
 use super::{Context, Cost, Estimate, Estimates, Estimator, Start};
-use crate::color::ColorModel;
+use crate::color::{ColorModel, Spectra as _};
 use crate::description::Properties;
 use crate::description::declared::Plugin;
 use crate::error::Result;
@@ -29,6 +29,13 @@ const BOUNCES: Bounces = Bounces { decisions: 2 };
 const LIGHT: u32 = 0;
 /// The second.
 const WAY: u32 = 1;
+
+/// A light sample whose visibility is still to be asked.
+#[derive(Clone, Copy, Debug)]
+struct Shadow<S> {
+    contribution: S,
+    slot: u32,
+}
 
 impl Path {
     pub(super) const PLUGIN: Plugin = Plugin {
@@ -78,8 +85,8 @@ impl<C: ColorModel> Estimator<C> for Path {
                 depth,
                 estimates,
             };
-            let light = |bounce: &mut Bounce<'_, C>, shadow: &Contribution<C::Sample>| {
-                shadow.add_to(bounce.estimates);
+            let light = |bounce: &mut Bounce<'_, C>, shadow: &Shadow<C::Sample>| {
+                bounce.estimates[shadow.slot as usize].radiance += shadow.contribution;
             };
             wave.shade(first, 1, &mut bounce, light, cost);
         }
@@ -94,7 +101,7 @@ struct Bounce<'a, C: ColorModel> {
 }
 
 impl<C: ColorModel> Shading<C> for Bounce<'_, C> {
-    type Shadow = Contribution<C::Sample>;
+    type Shadow = Shadow<C::Sample>;
 
     #[inline(always)]
     fn shade<F: Lanes>(&mut self, block: &Block<'_, C, F>, out: &mut Outcome<'_, C, Self::Shadow>) {
@@ -111,7 +118,7 @@ impl<C: ColorModel> Bounce<'_, C> {
     fn light<F: Lanes>(
         &self,
         block: &Block<'_, C, F>,
-        out: &mut Outcome<'_, C, Contribution<C::Sample>>,
+        out: &mut Outcome<'_, C, Shadow<C::Sample>>,
     ) {
         let numbers = block.decisions(LIGHT);
         let (u2, u1) = (numbers.u2::<F>(), numbers.u1::<F>());
@@ -121,7 +128,15 @@ impl<C: ColorModel> Bounce<'_, C> {
         let value = block.material.eval_lanes(at, at.wi, wo, w);
         let weight = F::select(light.delta, F::one(), power(light.pdf, value.pdf));
         let contribution = block.throughput * value.value * light.radiance * (weight / light.pdf);
-        out.light(block, &light, contribution);
+        let lit = at.active & F::zero().lt(light.pdf) & !contribution.is_black();
+        if !lit.any() {
+            return;
+        }
+        let contributions = contribution.rows();
+        out.ask(block, &light, lit, |lane| Shadow {
+            contribution: C::Columns::<F>::of(&contributions, lane),
+            slot: block.walker(lane).slot,
+        });
     }
 
     /// Turns the paths.
@@ -129,7 +144,7 @@ impl<C: ColorModel> Bounce<'_, C> {
     fn way<F: Lanes>(
         &mut self,
         block: &Block<'_, C, F>,
-        out: &mut Outcome<'_, C, Contribution<C::Sample>>,
+        out: &mut Outcome<'_, C, Shadow<C::Sample>>,
     ) {
         let numbers = block.decisions(WAY);
         let (u2, u1) = (numbers.u2::<F>(), numbers.u1::<F>());

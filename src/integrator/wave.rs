@@ -5,9 +5,9 @@
 use super::arrival::{Arrival, Scattered, look_through_emitters};
 use super::bounce::Decisions;
 use super::runs::Runs;
-use super::{Cost, Estimate, Start};
+use super::{Cost, Start};
 use crate::accel::Met;
-use crate::color::{ColorModel, Spectra as _, Spectral};
+use crate::color::{ColorModel, Spectra as _, Spectral as _};
 use crate::interaction::{Hit, Points, Ray};
 use crate::lanes::{Lanes, MAX_LANES, Mask as _, Task, Vec3};
 use crate::light::LightSamples;
@@ -194,40 +194,6 @@ impl<C: ColorModel, T> Outcome<'_, C, T> {
             };
             self.next.push(ray, walker);
         }
-    }
-}
-
-/// Light that is added where a shadow ray meets nothing.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Contribution<S> {
-    value: S,
-    slot: u32,
-}
-
-impl<S: Spectral> Contribution<S> {
-    pub(super) fn add_to(&self, estimates: &mut [Estimate<S>]) {
-        estimates[self.slot as usize].radiance += self.value;
-    }
-}
-
-impl<C: ColorModel> Outcome<'_, C, Contribution<C::Sample>> {
-    /// Asks whether light that was drawn can be seen, where it would bring anything.
-    #[inline(always)]
-    pub(super) fn light<F: Lanes>(
-        &mut self,
-        block: &Block<'_, C, F>,
-        light: &LightSamples<F, C::Columns<F>>,
-        value: C::Columns<F>,
-    ) {
-        let lit = block.at.active & F::zero().lt(light.pdf) & !value.is_black();
-        if !lit.any() {
-            return;
-        }
-        let values = value.rows();
-        self.ask(block, light, lit, |lane| Contribution {
-            value: C::Columns::<F>::of(&values, lane),
-            slot: block.walker(lane).slot,
-        });
     }
 }
 

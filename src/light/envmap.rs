@@ -190,6 +190,7 @@ impl<C: ColorModel> Envmap<C> {
         to_world: &Mat3,
         u: lanes::Vec2<F>,
         w: &[C::Wavelengths],
+        _active: F::Mask,
     ) -> LightSamples<F, C::Columns<F>> {
         let Some(cells) = &self.cells else {
             return LightSamples::none();
@@ -213,10 +214,10 @@ impl<C: ColorModel> BlockEmitter<C> for Envmap<C> {
         _from: lanes::Vec3<F>,
         u: lanes::Vec2<F>,
         w: &[C::Wavelengths],
-        _active: F::Mask,
+        active: F::Mask,
     ) -> LightSamples<F, C::Columns<F>> {
         // Of one that stands still; another is asked lane by lane.
-        self.sample_turned(&self.to_world.at(0.0), u, w)
+        self.sample_turned(&self.to_world.at(0.0), u, w, active)
     }
 }
 
@@ -229,7 +230,7 @@ impl<C: ColorModel> Emitter<C> for Envmap<C> {
     ) -> Option<LightSample<C::Sample>> {
         let to_world = self.to_world.at(from.time);
         let w = std::slice::from_ref(wavelengths);
-        block::single(self.sample_turned::<f32>(&to_world, u.into(), w))
+        block::single(self.sample_turned::<f32>(&to_world, u.into(), w, true))
     }
 
     fn is_environment(&self) -> bool {
