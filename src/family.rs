@@ -10,7 +10,8 @@
 macro_rules! family {
     (
         $(#[$meta:meta])*
-        $vis:vis enum $family:ident $(<$color:ident>)? : $interface:ident, context $context:ty {
+        $vis:vis enum $family:ident $(<$color:ident>)? : $interface:ident, context $context:ty
+            $(, visitor $visitor:ident)? {
             $($name:literal => $member:ident($type:ty)),+ $(,)?
         }
     ) => {
@@ -40,6 +41,8 @@ macro_rules! family {
             }
         }
 
+        crate::family::visited!($(<$color>)? $family, ($($visitor)?), $($member),+);
+
         impl $(<$color: crate::color::ColorModel>)? std::ops::Deref for $family $(<$color>)? {
             type Target = dyn $interface $(<$color>)?;
 
@@ -53,6 +56,22 @@ macro_rules! family {
 }
 
 pub(crate) use family;
+
+/// The one match over a family's members: what a visitor asks is compiled for each.
+macro_rules! visited {
+    ($(<$color:ident>)? $family:ident, (), $($member:ident),+) => {};
+    ($(<$color:ident>)? $family:ident, ($visitor:ident), $($member:ident),+) => {
+        impl $(<$color: crate::color::ColorModel>)? $family $(<$color>)? {
+            #[inline(always)]
+            fn visit<V: $visitor $(<$color>)?>(&self, visitor: V) -> V::Output {
+                match self {
+                    $(Self::$member(member) => visitor.visit(member)),+
+                }
+            }
+        }
+    };
+}
+pub(crate) use visited;
 
 use crate::description::declared::Plugin;
 use crate::description::properties::STRICT;

@@ -158,19 +158,6 @@ impl Interaction<'_> {
         }
     }
 
-    /// A ray from here to just before `target`, for asking whether it can be seen.
-    pub fn spawn_to(&self, target: Vec3) -> Ray {
-        let origin = self.offset(target - self.position);
-        let way = target - origin;
-        let distance = way.length();
-        Ray {
-            origin,
-            direction: way / distance,
-            t_max: distance * (1.0 - SHADOW_EPSILON),
-            time: self.time,
-        }
-    }
-
     fn offset(&self, direction: Vec3) -> Vec3 {
         let (position, error) = (self.position.into(), self.error.into());
         offset::offset(position, error, self.normal.into(), direction.into()).into()

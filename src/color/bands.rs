@@ -213,7 +213,7 @@ impl<const N: usize> ColorModel for Bands<N> {
         size_of::<SpectralTexel>()
     }
 
-    fn texels(&self, pixels: &Pixels, role: Role) -> Vec<SpectralTexel> {
+    fn texels(&self, pixels: Pixels, role: Role) -> Vec<SpectralTexel> {
         let table = Table::shared();
         let texel = |rgb| SpectralTexel::new(table, rgb, role);
         pixels.iter().map(texel).collect()

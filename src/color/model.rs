@@ -96,7 +96,7 @@ pub trait ColorModel: Clone + std::fmt::Debug + Send + Sync + 'static {
     /// The most bytes that each of these takes in its stored form.
     fn texel_bytes(pixels: &Pixels) -> usize;
     /// An image's texels in their stored form; reflectances are clamped to [0, 1].
-    fn texels(&self, pixels: &Pixels, role: Role) -> Self::Texels;
+    fn texels(&self, pixels: Pixels, role: Role) -> Self::Texels;
     /// Texels, one a lane, at their paths' wavelengths; what is beyond the last is that.
     fn evaluate_texels<F: Lanes>(
         texels: &Self::Texels,

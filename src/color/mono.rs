@@ -63,7 +63,7 @@ impl ColorModel for Mono {
         size_of::<f32>()
     }
 
-    fn texels(&self, pixels: &Pixels, role: Role) -> Vec<f32> {
+    fn texels(&self, pixels: Pixels, role: Role) -> Vec<f32> {
         let value = |rgb| self.evaluate_rgb(rgb, role, &())[0];
         pixels.iter().map(value).collect()
     }

@@ -85,7 +85,7 @@ impl ColorModel for Rgb {
         pixels.size()
     }
 
-    fn texels(&self, pixels: &Pixels, role: Role) -> Packed {
+    fn texels(&self, pixels: Pixels, role: Role) -> Packed {
         Packed::new(pixels, |rgb| self.evaluate_rgb(rgb, role, &()).0)
     }
 

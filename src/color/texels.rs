@@ -62,10 +62,10 @@ pub enum Packed {
 
 impl Packed {
     /// In the smallest form that holds them.
-    pub(super) fn new(pixels: &Pixels, color: impl Fn([f32; 3]) -> [f32; 3]) -> Self {
+    pub(super) fn new(pixels: Pixels, color: impl Fn([f32; 3]) -> [f32; 3]) -> Self {
         if let Pixels::Codes(codes, values) = pixels {
             let values = values.map(|value| color([value; 3])[0]);
-            return Self::Codes(codes.clone(), Box::new(values));
+            return Self::Codes(codes, Box::new(values));
         }
         let halves = pixels.iter().map(|rgb| {
             let [r, g, b] = color(rgb).map(to_half);
@@ -154,7 +154,7 @@ mod tests {
         let halves = Pixels::Linear(halves[..2].to_vec());
         let large = Pixels::Linear(vec![[65536.0, 0.0, 0.0]]);
         let kinds = [codes, halves, singles, large].map(|pixels| {
-            let packed = Packed::new(&pixels, |rgb| rgb);
+            let packed = Packed::new(pixels.clone(), |rgb| rgb);
             for (index, expected) in pixels.iter().enumerate() {
                 let found = packed.at::<f32>(Wrapping(index as u32));
                 assert_eq!(found.map(f32::to_bits), expected.map(f32::to_bits));

@@ -3,11 +3,9 @@
 //! for whether the path goes on. So what is decided together is placed together, and what one decision draws does not
 //! shift the next.
 
-use glam::Vec2;
-
 use super::FIRST_DIMENSION;
-use crate::lanes::{self, Lanes, MAX_LANES};
-use crate::sampler::{Sampler, Stream};
+use crate::lanes::{Lanes, Vec2};
+use crate::sampler::{Sampler, Streams};
 
 /// Dimensions of a decision.
 const DIMENSIONS: u32 = 4;
@@ -30,22 +28,18 @@ impl Bounces {
 
 /// The numbers of a decision of paths in lanes.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Decisions<'a> {
+pub(super) struct Decisions<'a, F: Lanes> {
     sampler: &'a Sampler,
-    /// Of each path, from the first lane on.
-    streams: &'a [Stream],
+    /// Of the paths.
+    streams: Streams<F>,
     /// The decision's first dimension.
     first: u32,
 }
 
-impl<'a> Decisions<'a> {
+impl<'a, F: Lanes> Decisions<'a, F> {
     /// Those of decision `number` of a bounce whose first dimension is `first`.
-    pub(super) fn new(
-        sampler: &'a Sampler,
-        streams: &'a [Stream],
-        first: u32,
-        number: u32,
-    ) -> Self {
+    #[inline(always)]
+    pub(super) fn new(sampler: &'a Sampler, streams: Streams<F>, first: u32, number: u32) -> Self {
         Self {
             sampler,
             streams,
@@ -55,40 +49,20 @@ impl<'a> Decisions<'a> {
 
     /// For a point or a direction.
     #[inline(always)]
-    pub(super) fn u2<F: Lanes>(&self) -> lanes::Vec2<F> {
-        let mut pairs = [Vec2::ZERO; MAX_LANES];
-        let pairs = &mut pairs[..self.streams.len()];
-        self.sampler.fill_2d(self.streams, self.first, pairs);
-        let mut rows = [F::ROW; 2];
-        for (lane, pair) in pairs.iter().enumerate() {
-            (rows[0][lane], rows[1][lane]) = (pair.x, pair.y);
-        }
-        lanes::Vec2::<F>::load(&rows)
+    pub(super) fn u2(&self) -> Vec2<F> {
+        self.sampler.pair(self.streams, self.first)
     }
 
     /// For which light or lobe.
     #[inline(always)]
-    pub(super) fn u1<F: Lanes>(&self) -> F {
-        self.number(2)
+    pub(super) fn u1(&self) -> F {
+        self.sampler.number(self.streams, self.first + 2)
     }
 
     /// The number for whether the path goes on.
     #[inline(always)]
-    pub(super) fn survival<F: Lanes>(&self) -> F {
-        self.number(3)
-    }
-
-    #[inline(always)]
-    fn number<F: Lanes>(&self, dimension: u32) -> F {
-        let mut numbers = [0.0; MAX_LANES];
-        let numbers = &mut numbers[..self.streams.len()];
-        let dimension = self.first + dimension;
-        self.sampler.fill_1d(self.streams, dimension, numbers);
-        let mut row = F::ROW;
-        for (lane, number) in numbers.iter().enumerate() {
-            row[lane] = *number;
-        }
-        F::load(&row)
+    pub(super) fn survival(&self) -> F {
+        self.sampler.number(self.streams, self.first + 3)
     }
 }
 
@@ -103,7 +77,7 @@ mod tests {
         for depth in 0..5 {
             let first = bounces.first(depth).unwrap();
             for number in 0..3 {
-                let decision = Decisions::new(&sampler, &[], first, number);
+                let decision = Decisions::<f32>::new(&sampler, Streams::of(&[]), first, number);
                 assert_eq!(decision.first, next);
                 next += DIMENSIONS;
             }

@@ -6,13 +6,13 @@
 use super::bounce::Bounces;
 use super::limits;
 use super::mis::power;
-use super::wave::{Block, Outcome, Shading, Wave, Ways};
+use super::wave::{Block, Contribution, Outcome, Shading, Wave, Ways};
 use super::{Context, Cost, Estimate, Estimates, Estimator, Start};
-use crate::color::{ColorModel, Spectra as _, Spectral as _};
+use crate::color::{ColorModel, Spectral as _};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, integer};
 use crate::error::Result;
-use crate::lanes::{Lanes, MAX_LANES, Mask as _};
+use crate::lanes::{Lanes, MAX_LANES};
 use crate::sampler::Sampler;
 use crate::scene::Scene;
 
@@ -22,13 +22,6 @@ pub struct Direct {
     emitter_samples: u32,
     bsdf_samples: u32,
     hide_emitters: bool,
-}
-
-/// A light sample whose visibility is still to be asked.
-#[derive(Clone, Copy, Debug)]
-struct Shadow<S> {
-    contribution: S,
-    slot: u32,
 }
 
 /// About how many samples of a kind are in memory at once.
@@ -121,7 +114,7 @@ impl<C: ColorModel> Estimator<C> for Direct {
 impl Direct {
     fn estimate_part<C: ColorModel>(
         &self,
-        mut wave: Wave<'_, C, Shadow<C::Sample>>,
+        mut wave: Wave<'_, C, Contribution<C::Sample>>,
         estimates: &mut [Estimate<C::Sample>],
         cost: &mut Cost,
     ) {
@@ -140,8 +133,8 @@ impl Direct {
             return;
         };
         let mut bounce = Bounce(self);
-        let light = |_: &mut Bounce<'_>, shadow: &Shadow<C::Sample>| {
-            estimates[shadow.slot as usize].radiance += shadow.contribution;
+        let light = |_: &mut Bounce<'_>, shadow: &Contribution<C::Sample>| {
+            shadow.add_to(estimates);
         };
         wave.shade(first, self.emitter_samples, &mut bounce, light, cost);
         wave.trace(1, false, cost);
@@ -153,7 +146,7 @@ impl Direct {
 struct Bounce<'a>(&'a Direct);
 
 impl<C: ColorModel> Shading<C> for Bounce<'_> {
-    type Shadow = Shadow<C::Sample>;
+    type Shadow = Contribution<C::Sample>;
 
     #[inline(always)]
     fn shade<F: Lanes>(&mut self, block: &Block<'_, C, F>, out: &mut Outcome<'_, C, Self::Shadow>) {
@@ -175,10 +168,10 @@ impl Bounce<'_> {
         &self,
         block: &Block<'_, C, F>,
         decision: u32,
-        out: &mut Outcome<'_, C, Shadow<C::Sample>>,
+        out: &mut Outcome<'_, C, Contribution<C::Sample>>,
     ) {
         let numbers = block.decisions(decision);
-        let (u2, u1) = (numbers.u2::<F>(), numbers.u1::<F>());
+        let (u2, u1) = (numbers.u2(), numbers.u1());
         let (at, w) = (&block.at, block.wavelengths);
         let light = block.scene.sample_lights(at, u1, u2, w);
         let wo = at.frame.to_local(light.direction);
@@ -188,15 +181,7 @@ impl Bounce<'_> {
         let count = F::splat(self.0.emitter_samples as f32);
         let weight = power(light.pdf * light_share, other) / (light.pdf * count);
         let contribution = block.throughput * value.value * light.radiance * weight;
-        let lit = at.active & F::zero().lt(light.pdf) & !contribution.is_black();
-        if !lit.any() {
-            return;
-        }
-        let contributions = contribution.rows();
-        out.ask(block, &light, lit, |lane| Shadow {
-            contribution: C::Columns::<F>::of(&contributions, lane),
-            slot: block.walker(lane).slot,
-        });
+        out.light(block, &light, contribution);
     }
 
     /// Looks for light where the material scatters to.
@@ -205,10 +190,10 @@ impl Bounce<'_> {
         &self,
         block: &Block<'_, C, F>,
         decision: u32,
-        out: &mut Outcome<'_, C, Shadow<C::Sample>>,
+        out: &mut Outcome<'_, C, Contribution<C::Sample>>,
     ) {
         let numbers = block.decisions(decision);
-        let (u2, u1) = (numbers.u2::<F>(), numbers.u1::<F>());
+        let (u2, u1) = (numbers.u2(), numbers.u1());
         let (at, w) = (&block.at, block.wavelengths);
         let sample = block.material.sample_lanes(at, at.wi, u1, u2, w);
         let [light_share, bsdf_share] = self.0.shares();

@@ -113,7 +113,7 @@ impl Limits {
         depth: u32,
         throughput: S,
         eta: F,
-        decision: &Decisions<'_>,
+        decision: &Decisions<'_, F>,
     ) -> (F::Mask, S) {
         let lit = !throughput.is_black();
         if depth + 1 < self.rr_depth {
@@ -121,7 +121,7 @@ impl Limits {
         }
         let survival = throughput.max_value() * eta * eta;
         let survival = survival.min(F::splat(MAX_SURVIVAL));
-        let lives = lit & decision.survival::<F>().lt(survival);
+        let lives = lit & decision.survival().lt(survival);
         (lives, throughput * (F::one() / survival))
     }
 }

@@ -6,9 +6,9 @@
 use super::bounce::Bounces;
 use super::limits::{self, Limits};
 use super::mis::power;
-use super::wave::{Block, Outcome, Shading, Wave, Ways};
+use super::wave::{Block, Contribution, Outcome, Shading, Wave, Ways};
 use super::{Context, Cost, Estimate, Estimates, Estimator, Start};
-use crate::color::{ColorModel, Spectra as _};
+use crate::color::ColorModel;
 use crate::description::Properties;
 use crate::description::declared::Plugin;
 use crate::error::Result;
@@ -29,13 +29,6 @@ const BOUNCES: Bounces = Bounces { decisions: 2 };
 const LIGHT: u32 = 0;
 /// The second.
 const WAY: u32 = 1;
-
-/// A light sample whose visibility is still to be asked.
-#[derive(Clone, Copy, Debug)]
-struct Shadow<S> {
-    contribution: S,
-    slot: u32,
-}
 
 impl Path {
     pub(super) const PLUGIN: Plugin = Plugin {
@@ -85,8 +78,8 @@ impl<C: ColorModel> Estimator<C> for Path {
                 depth,
                 estimates,
             };
-            let light = |bounce: &mut Bounce<'_, C>, shadow: &Shadow<C::Sample>| {
-                bounce.estimates[shadow.slot as usize].radiance += shadow.contribution;
+            let light = |bounce: &mut Bounce<'_, C>, shadow: &Contribution<C::Sample>| {
+                shadow.add_to(bounce.estimates);
             };
             wave.shade(first, 1, &mut bounce, light, cost);
         }
@@ -101,7 +94,7 @@ struct Bounce<'a, C: ColorModel> {
 }
 
 impl<C: ColorModel> Shading<C> for Bounce<'_, C> {
-    type Shadow = Shadow<C::Sample>;
+    type Shadow = Contribution<C::Sample>;
 
     #[inline(always)]
     fn shade<F: Lanes>(&mut self, block: &Block<'_, C, F>, out: &mut Outcome<'_, C, Self::Shadow>) {
@@ -118,25 +111,17 @@ impl<C: ColorModel> Bounce<'_, C> {
     fn light<F: Lanes>(
         &self,
         block: &Block<'_, C, F>,
-        out: &mut Outcome<'_, C, Shadow<C::Sample>>,
+        out: &mut Outcome<'_, C, Contribution<C::Sample>>,
     ) {
         let numbers = block.decisions(LIGHT);
-        let (u2, u1) = (numbers.u2::<F>(), numbers.u1::<F>());
+        let (u2, u1) = (numbers.u2(), numbers.u1());
         let (at, w) = (&block.at, block.wavelengths);
         let light = block.scene.sample_lights(at, u1, u2, w);
         let wo = at.frame.to_local(light.direction);
         let value = block.material.eval_lanes(at, at.wi, wo, w);
         let weight = F::select(light.delta, F::one(), power(light.pdf, value.pdf));
         let contribution = block.throughput * value.value * light.radiance * (weight / light.pdf);
-        let lit = at.active & F::zero().lt(light.pdf) & !contribution.is_black();
-        if !lit.any() {
-            return;
-        }
-        let contributions = contribution.rows();
-        out.ask(block, &light, lit, |lane| Shadow {
-            contribution: C::Columns::<F>::of(&contributions, lane),
-            slot: block.walker(lane).slot,
-        });
+        out.light(block, &light, contribution);
     }
 
     /// Turns the paths.
@@ -144,10 +129,10 @@ impl<C: ColorModel> Bounce<'_, C> {
     fn way<F: Lanes>(
         &mut self,
         block: &Block<'_, C, F>,
-        out: &mut Outcome<'_, C, Shadow<C::Sample>>,
+        out: &mut Outcome<'_, C, Contribution<C::Sample>>,
     ) {
         let numbers = block.decisions(WAY);
-        let (u2, u1) = (numbers.u2::<F>(), numbers.u1::<F>());
+        let (u2, u1) = (numbers.u2(), numbers.u1());
         let (at, w) = (&block.at, block.wavelengths);
         let sample = block.material.sample_lanes(at, at.wi, u1, u2, w);
         for lane in (at.active & !(sample.drawn & sample.null)).lanes() {

@@ -232,7 +232,7 @@ impl<S: Spectral> Bounce<'_, '_, S> {
         light: u32,
         out: &mut Outcome<'_, C, Shadow<S>>,
     ) {
-        let u2 = block.decisions(light).u2::<F>();
+        let u2 = block.decisions(light).u2();
         let (at, w) = (&block.at, block.wavelengths);
         let from = &block.scene.lights()[light as usize];
         let sample = from.sample_lanes(at, u2, w, at.active);
@@ -274,7 +274,7 @@ impl<S: Spectral> Bounce<'_, '_, S> {
         out: &mut Outcome<'_, C, Shadow<S>>,
     ) {
         let numbers = block.decisions(self.lights);
-        let (u2, u1) = (numbers.u2::<F>(), numbers.u1::<F>());
+        let (u2, u1) = (numbers.u2(), numbers.u1());
         let (at, w) = (&block.at, block.wavelengths);
         let sample = block.material.sample_lanes(at, at.wi, u1, u2, w);
         for lane in (at.active & !(sample.drawn & sample.null)).lanes() {

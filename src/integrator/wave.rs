@@ -5,14 +5,14 @@
 use super::arrival::{Arrival, Scattered, look_through_emitters};
 use super::bounce::Decisions;
 use super::runs::Runs;
-use super::{Cost, Start};
+use super::{Cost, Estimate, Start};
 use crate::accel::Met;
-use crate::color::{ColorModel, Spectra as _, Spectral as _};
+use crate::color::{ColorModel, Spectra as _, Spectral};
 use crate::interaction::{Hit, Points, Ray};
 use crate::lanes::{Lanes, MAX_LANES, Mask as _, Task, Vec3};
 use crate::light::LightSamples;
 use crate::material::Material;
-use crate::sampler::{Sampler, Stream};
+use crate::sampler::{Sampler, Stream, Streams};
 use crate::scene::Scene;
 
 /// A path on its way, beside its ray.
@@ -74,7 +74,7 @@ pub(super) struct Block<'a, C: ColorModel, F: Lanes> {
     /// From the first lane on.
     pub(super) wavelengths: &'a [C::Wavelengths],
     sampler: &'a Sampler,
-    streams: &'a [Stream],
+    streams: Streams<F>,
     /// The bounce's first dimension.
     first: u32,
     walkers: &'a WithRays<Walker<C>>,
@@ -85,7 +85,7 @@ pub(super) struct Block<'a, C: ColorModel, F: Lanes> {
 impl<C: ColorModel, F: Lanes> Block<'_, C, F> {
     /// The random numbers of the bounce's decision `number`.
     #[inline(always)]
-    pub(super) fn decisions(&self, number: u32) -> Decisions<'_> {
+    pub(super) fn decisions(&self, number: u32) -> Decisions<'_, F> {
         Decisions::new(self.sampler, self.streams, self.first, number)
     }
 
@@ -194,6 +194,40 @@ impl<C: ColorModel, T> Outcome<'_, C, T> {
             };
             self.next.push(ray, walker);
         }
+    }
+}
+
+/// Light that is added where a shadow ray meets nothing.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Contribution<S> {
+    value: S,
+    slot: u32,
+}
+
+impl<S: Spectral> Contribution<S> {
+    pub(super) fn add_to(&self, estimates: &mut [Estimate<S>]) {
+        estimates[self.slot as usize].radiance += self.value;
+    }
+}
+
+impl<C: ColorModel> Outcome<'_, C, Contribution<C::Sample>> {
+    /// Asks whether light that was drawn can be seen, where it would bring anything.
+    #[inline(always)]
+    pub(super) fn light<F: Lanes>(
+        &mut self,
+        block: &Block<'_, C, F>,
+        light: &LightSamples<F, C::Columns<F>>,
+        value: C::Columns<F>,
+    ) {
+        let lit = block.at.active & F::zero().lt(light.pdf) & !value.is_black();
+        if !lit.any() {
+            return;
+        }
+        let values = value.rows();
+        self.ask(block, light, lit, |lane| Contribution {
+            value: C::Columns::<F>::of(&values, lane),
+            slot: block.walker(lane).slot,
+        });
     }
 }
 
@@ -385,7 +419,7 @@ impl<'a, C: ColorModel, S: Shading<C>, R: Iterator<Item = (usize, &'a [u32])>> T
                     }),
                     wavelengths: &wavelengths,
                     sampler: self.sampler,
-                    streams: &streams[..indices.len()],
+                    streams: Streams::of(&streams[..indices.len()]),
                     first: self.first,
                     walkers: self.walkers,
                     indices,

@@ -12,9 +12,12 @@
 //! not expanded, where the instructions are known is compiled without them, and is an order of magnitude slower.
 //! [`Lanes::call`] is the way to call one: it begins a function that knows the instructions again.
 
+mod divisor;
 mod elementary;
 mod frame;
 mod kernel;
+mod long;
+pub mod random;
 mod single;
 mod vector;
 pub mod warp;
@@ -24,9 +27,11 @@ mod x86;
 use std::fmt::Debug;
 use std::ops::{Add, BitAnd, BitOr, BitXor, Div, Index, IndexMut, Mul, Neg, Not, Sub};
 
+pub use divisor::Divisor;
 pub use elementary::{acos, atan2, erf, erf_inverse, exp, ln, pow, sin_cos, sin_cos_turns};
 pub use frame::Frame;
 pub use kernel::{Kernel, Set};
+pub use long::Long;
 pub use vector::{Vec2, Vec3};
 
 /// No lanes are more.
@@ -230,7 +235,7 @@ pub trait Ints:
     type Mask;
 
     /// An integer for each lane.
-    type Row: Copy + Debug + Index<usize, Output = u32>;
+    type Row: Copy + Debug + Index<usize, Output = u32> + IndexMut<usize>;
     /// Zeros.
     const ROW: Self::Row;
 
@@ -244,6 +249,8 @@ pub trait Ints:
     fn gather(table: &[u32], index: Self) -> Self;
     /// `self` where it is less, else `other`, both without a sign.
     fn min(self, other: Self) -> Self;
+    /// Bits 32 to 63 of the product, both without a sign.
+    fn mul_high(self, other: Self) -> Self;
     /// `yes` where the mask is set, else `no`.
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
     /// With zeros from below.
@@ -259,6 +266,20 @@ pub trait Ints:
     /// The number with these bits.
     #[expect(clippy::wrong_self_convention)]
     fn from_bits(self) -> Self::Float;
+
+    /// The bits in the other order.
+    #[inline(always)]
+    fn reverse_bits(self) -> Self {
+        let odd = Self::splat(0x5555_5555);
+        let x = (self & odd).shl::<1>() | (self.shr::<1>() & odd);
+        let pairs = Self::splat(0x3333_3333);
+        let x = (x & pairs).shl::<2>() | (x.shr::<2>() & pairs);
+        let fours = Self::splat(0x0f0f_0f0f);
+        let x = (x & fours).shl::<4>() | (x.shr::<4>() & fours);
+        let bytes = Self::splat(0x00ff_00ff);
+        let x = (x & bytes).shl::<8>() | (x.shr::<8>() & bytes);
+        x.shl::<16>() | x.shr::<16>()
+    }
 }
 
 /// Yes or no, one a lane.

@@ -141,6 +141,10 @@ impl Ints for Wrapping<u32> {
         Self(self.0.min(other.0))
     }
     #[inline(always)]
+    fn mul_high(self, other: Self) -> Self {
+        Self(((u64::from(self.0) * u64::from(other.0)) >> 32) as u32)
+    }
+    #[inline(always)]
     fn select(mask: bool, yes: Self, no: Self) -> Self {
         if mask { yes } else { no }
     }

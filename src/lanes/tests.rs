@@ -1,5 +1,7 @@
 //! Functions against double precision, and every kind of lanes against single numbers, bit by bit.
 
+use std::num::Wrapping;
+
 use super::*;
 use crate::math::random;
 
@@ -139,6 +141,10 @@ impl Task for Everything<'_> {
                 number(bits_a.lt(bits_b)),
                 number(bits_a.eq(bits_a)),
                 bits_a.min(bits_b).from_bits(),
+                bits_a.mul_high(bits_b).from_bits(),
+                bits_a.reverse_bits().from_bits(),
+                Divisor::new(77).divide(bits_a).0.from_bits(),
+                Divisor::new(77).divide(bits_a).1.from_bits(),
                 F::Int::select(a.lt(b), bits_a, bits_b).from_bits(),
                 F::gather(&numbers, bits_a.shr::<28>()),
                 F::Int::gather(&integers, bits_b).from_bits(),
@@ -198,5 +204,56 @@ fn the_lanes_of_a_mask_are_those_that_say_yes() {
         let expected = [0, 2, 4];
         let found = kernel.run(Lanes5);
         assert_eq!(found, expected[..found.len()], "{}", kernel.name());
+    }
+}
+
+#[test]
+fn integers_are_divided_and_multiplied_exactly() {
+    for divisor in [1_u32, 2, 3, 7, 64, 1023, 65_537, 1 << 30, (1 << 31) - 1] {
+        let dividends = (0..70_000).chain([1 << 16, 1 << 31, u32::MAX - 1, u32::MAX]);
+        for x in dividends.chain((0..1000).map(|i| divisor.wrapping_mul(i).wrapping_sub(1))) {
+            let (quotient, rest) = Divisor::new(divisor).divide(Wrapping(x));
+            assert_eq!(
+                (quotient.0, rest.0),
+                (x / divisor, x % divisor),
+                "{x} / {divisor}"
+            );
+        }
+    }
+    let together = |x: Long<Wrapping<u32>>| u64::from(x.low.0) | u64::from(x.high.0) << 32;
+    for i in 0..1000 {
+        let (a, b) = (random::bits(1, i), random::bits(2, i));
+        let long = Long::splat(a);
+        assert_eq!(together(long.times(b)), a.wrapping_mul(b));
+        assert_eq!(together(long + Long::splat(b)), a.wrapping_add(b));
+        assert_eq!(together(long.xor_shr::<27, 5>()), a ^ a >> 27);
+        assert_eq!(
+            Wrapping(a as u32).reverse_bits().0,
+            (a as u32).reverse_bits()
+        );
+        let dimension = b as u32;
+        let expected = random::bits(a, dimension);
+        assert_eq!(together(super::random::bits(long, dimension)), expected);
+        assert_eq!(
+            together(super::random::bits_along(long, Wrapping(dimension))),
+            expected
+        );
+        let unit: f32 = super::random::unit(long.high);
+        assert_eq!(unit, random::unit(a));
+    }
+}
+
+#[test]
+fn every_key_permutes() {
+    for n in [1, 2, 3, 7, 16, 100, 1000] {
+        for k in 0..20 {
+            let key = Long::splat(random::key(k, 1));
+            let mut seen = vec![false; n as usize];
+            for i in (0..n).map(Wrapping) {
+                let place = super::random::permute::<f32>(i, Divisor::new(n), key);
+                seen[place.0 as usize] = true;
+            }
+            assert!(seen.iter().all(|&s| s), "n = {n}, key {k}");
+        }
     }
 }

@@ -133,11 +133,13 @@ impl<C: ColorModel> Envmap<C> {
         let y = qy.to_int().min(all(height - 2));
         let (fx, fy) = (qx - x.to_float(), qy - y.to_float());
         let next = F::Int::select(x.eq(all(width - 1)), all(0), x + all(1));
-        let texel = |index| C::evaluate_texels(&self.texels, index, w);
+        let texels = &self.texels;
         let (upper, lower) = (y * all(width), (y + all(1)) * all(width));
         let (gx, gy) = (F::one() - fx, F::one() - fy);
-        let above = texel(upper + x) * gx + texel(upper + next) * fx;
-        let below = texel(lower + x) * gx + texel(lower + next) * fx;
+        let above = C::evaluate_texels(texels, upper + x, w) * gx
+            + C::evaluate_texels(texels, upper + next, w) * fx;
+        let below = C::evaluate_texels(texels, lower + x, w) * gx
+            + C::evaluate_texels(texels, lower + next, w) * fx;
         (above * gy + below * fy) * F::splat(self.scale)
     }
 
@@ -190,7 +192,6 @@ impl<C: ColorModel> Envmap<C> {
         to_world: &Mat3,
         u: lanes::Vec2<F>,
         w: &[C::Wavelengths],
-        _active: F::Mask,
     ) -> LightSamples<F, C::Columns<F>> {
         let Some(cells) = &self.cells else {
             return LightSamples::none();
@@ -214,10 +215,10 @@ impl<C: ColorModel> BlockEmitter<C> for Envmap<C> {
         _from: lanes::Vec3<F>,
         u: lanes::Vec2<F>,
         w: &[C::Wavelengths],
-        active: F::Mask,
+        _active: F::Mask,
     ) -> LightSamples<F, C::Columns<F>> {
         // Of one that stands still; another is asked lane by lane.
-        self.sample_turned(&self.to_world.at(0.0), u, w, active)
+        self.sample_turned(&self.to_world.at(0.0), u, w)
     }
 }
 
@@ -230,7 +231,7 @@ impl<C: ColorModel> Emitter<C> for Envmap<C> {
     ) -> Option<LightSample<C::Sample>> {
         let to_world = self.to_world.at(from.time);
         let w = std::slice::from_ref(wavelengths);
-        block::single(self.sample_turned::<f32>(&to_world, u.into(), w, true))
+        block::single(self.sample_turned::<f32>(&to_world, u.into(), w))
     }
 
     fn is_environment(&self) -> bool {

@@ -8,13 +8,16 @@ use std::convert::Infallible;
 use rand::TryRng;
 
 /// The golden ratio's fraction in 64 bits, SplitMix64's step.
-const STEP: u64 = 0x9e37_79b9_7f4a_7c15;
+pub(crate) const STEP: u64 = 0x9e37_79b9_7f4a_7c15;
+
+/// By which [`mix`] multiplies.
+pub(crate) const FACTORS: [u64; 2] = [0xbf58_476d_1ce4_e5b9, 0x94d0_49bb_1331_11eb];
 
 /// A bijection of 64 bits that lets every input bit reach every output bit.
 #[inline]
 pub fn mix(mut x: u64) -> u64 {
-    x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    x = (x ^ (x >> 30)).wrapping_mul(FACTORS[0]);
+    x = (x ^ (x >> 27)).wrapping_mul(FACTORS[1]);
     x ^ (x >> 31)
 }
 
@@ -34,45 +37,6 @@ pub fn bits(key: u64, dimension: u32) -> u64 {
 #[inline]
 pub fn unit(bits: u64) -> f32 {
     (bits >> 40) as f32 * (1.0 / 16_777_216.0)
-}
-
-/// Where index `i` of `n` goes in the permutation of 0..n that `key` selects; `i < n`.
-///
-/// Kensler, *Correlated multi-jittered sampling* (2013): a bijection of the next power of two, walked
-/// until it lands inside the range.
-#[inline]
-pub fn permute(mut i: u32, n: u32, key: u64) -> u32 {
-    debug_assert!(i < n);
-    if n <= 1 {
-        return 0;
-    }
-    let w = u32::MAX >> (n - 1).leading_zeros();
-    let p = (key ^ (key >> 32)) as u32;
-    loop {
-        i ^= p;
-        i = i.wrapping_mul(0xe170_893d);
-        i ^= p >> 16;
-        i ^= (i & w) >> 4;
-        i ^= p >> 8;
-        i = i.wrapping_mul(0x0929_eb3f);
-        i ^= p >> 23;
-        i ^= (i & w) >> 1;
-        i = i.wrapping_mul(1 | p >> 27);
-        i = i.wrapping_mul(0x6935_fa69);
-        i ^= (i & w) >> 11;
-        i = i.wrapping_mul(0x74dc_b303);
-        i ^= (i & w) >> 2;
-        i = i.wrapping_mul(0x9e50_1cc3);
-        i ^= (i & w) >> 2;
-        i = i.wrapping_mul(0xc860_a3df);
-        i &= w;
-        i ^= i >> 5;
-        if i < n {
-            // (i + p) mod n, by a division that need not wait for i.
-            let back = n - p % n;
-            return if i >= back { i - back } else { i + (n - back) };
-        }
-    }
 }
 
 /// The numbers along a key one after another, for `rand`'s distributions where order is no matter: the
@@ -135,18 +99,5 @@ mod tests {
             sum[1].abs() / scale < 4.0 / 12.0 && sum[2].abs() / scale < 4.0 / 12.0,
             "{sum:?}"
         );
-    }
-
-    #[test]
-    fn every_key_permutes() {
-        for n in [1, 2, 3, 7, 16, 100, 1000] {
-            for k in 0..20 {
-                let mut seen = vec![false; n as usize];
-                for i in 0..n {
-                    seen[permute(i, n, key(k, 1)) as usize] = true;
-                }
-                assert!(seen.iter().all(|&s| s), "n = {n}, key {k}");
-            }
-        }
     }
 }

@@ -95,7 +95,11 @@ impl Ladder {
     /// nothing: those of `grid`, and of `stratified` without jitter.
     fn repeats_itself(&self) -> bool {
         let set = |first: u32| {
-            let point = |i| self.pilot.get_2d(0, first + i, 0).to_array();
+            let point = |i| {
+                Stream::new(0, 0, 0, first + i)
+                    .pair(&self.pilot, 0)
+                    .to_array()
+            };
             let mut points: Vec<_> = (0..self.set).map(point).collect();
             points.sort_by(|a, b| a.partial_cmp(b).expect("coordinates are numbers"));
             points

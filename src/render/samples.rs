@@ -10,7 +10,7 @@ use crate::color::ColorModel;
 use crate::film::{GROUP, Group, Layout, Tally};
 use crate::integrator::{Cost, Estimate, Estimates, Estimator as _, Start};
 use crate::lanes::{Kernel, Lanes, Task, Vec2};
-use crate::sampler::{Sampler, Stream};
+use crate::sampler::{Sampler, Stream, Streams};
 
 /// Bytes of path state in flight in a batch: within a core's caches, with rays enough for the tracer.
 const BATCH_BYTES: usize = 512 << 10;
@@ -126,7 +126,8 @@ pub(super) trait Sink {
     fn take(&mut self, kernel: Kernel, group: &Group, values: &[[f32; GROUP]]);
 }
 
-/// The dimensions of a camera sample, after those of its place in the pixel.
+/// The dimensions of a camera sample.
+const PLACE: u32 = 0;
 const LENS: u32 = 2;
 const TIME: u32 = 4;
 const WAVELENGTH: u32 = 5;
@@ -136,35 +137,46 @@ struct CameraSamples<'a, C: ColorModel> {
     job: &'a Job<'a, C>,
     pixel: [u32; 2],
     streams: &'a [Stream],
-    /// Where they lie within the pixel.
-    offsets: &'a [[f32; GROUP]; 2],
-    lenses: &'a [[f32; GROUP]; 2],
-    times: &'a [f32],
     /// Where they go.
     starts: &'a mut Vec<Start<C>>,
     sampler: &'a Sampler,
 }
 
 impl<C: ColorModel> Task for CameraSamples<'_, C> {
-    type Output = ();
+    /// Where they lie within the pixel.
+    type Output = [[f32; GROUP]; 2];
 
     #[inline(always)]
-    fn run<F: Lanes>(self) {
+    fn run<F: Lanes>(self) -> Self::Output {
         let View { sensor, film, .. } = &self.job.view;
         let margin = film.margin() as f32;
         let [x, y] = self.pixel.map(|n| n as f32 - margin);
         let (width, height) = (F::splat(film.width as f32), F::splat(film.height as f32));
-        let mut streams = self.streams.iter();
+        let (open, close) = sensor.shutter();
+        let (mut offsets, mut times) = ([[0.0; GROUP]; 2], [open; GROUP]);
+        let mut begun = self.streams.iter();
         for first in (0..self.streams.len()).step_by(F::WIDTH) {
-            let end = self.times.len().min(first + F::WIDTH);
-            let load = |rows: &[[f32; GROUP]; 2], axis: usize| F::from_slice(&rows[axis][first..]);
+            let streams = Streams::<F>::of(&self.streams[first..]);
+            let offset = self.sampler.pair(streams, PLACE);
+            offset.x.store_to(&mut offsets[0][first..]);
+            offset.y.store_to(&mut offsets[1][first..]);
             let place = Vec2::new(
-                (F::splat(x) + load(self.offsets, 0)) / width,
-                (F::splat(y) + load(self.offsets, 1)) / height,
+                (F::splat(x) + offset.x) / width,
+                (F::splat(y) + offset.y) / height,
             );
-            let lens = Vec2::new(load(self.lenses, 0), load(self.lenses, 1));
-            sensor.rays(place, lens, &self.times[first..end], |ray| {
-                let Some(stream) = streams.next() else { return };
+            // What nobody looks at is not drawn: as a rule three of four draws.
+            let mut lens = Vec2::new(F::zero(), F::zero());
+            if sensor.has_lens() {
+                lens = self.sampler.pair(streams, LENS);
+            }
+            if open < close {
+                let time = self.sampler.number(streams, TIME);
+                let time = F::splat(open) + time * F::splat(close - open);
+                time.store_to(&mut times[first..]);
+            }
+            let end = self.streams.len().min(first + F::WIDTH);
+            sensor.rays(place, lens, &times[first..end], |ray| {
+                let Some(stream) = begun.next() else { return };
                 let number = || stream.number(self.sampler, WAVELENGTH);
                 self.starts.push(Start {
                     ray,
@@ -173,6 +185,7 @@ impl<C: ColorModel> Task for CameraSamples<'_, C> {
                 });
             });
         }
+        offsets
     }
 }
 
@@ -184,47 +197,16 @@ fn begin<C: ColorModel>(
     streams: &[Stream],
     starts: &mut Vec<Start<C>>,
 ) -> Group {
-    let sensor = &job.view.sensor;
-    let mut pairs = [glam::Vec2::ZERO; GROUP];
-    let pairs = &mut pairs[..streams.len()];
-    let rows = |pairs: &[glam::Vec2]| {
-        let mut rows = [[0.0; GROUP]; 2];
-        for (i, pair) in pairs.iter().enumerate() {
-            (rows[0][i], rows[1][i]) = (pair.x, pair.y);
-        }
-        rows
-    };
-    sampler.fill_2d(streams, 0, pairs);
-    let offsets = rows(pairs);
-    // What nobody looks at is not drawn: as a rule three of four draws.
-    let mut lenses = [[0.0; GROUP]; 2];
-    if sensor.has_lens() {
-        sampler.fill_2d(streams, LENS, pairs);
-        lenses = rows(pairs);
-    }
-    let (open, close) = sensor.shutter();
-    let mut times = [open; GROUP];
-    let times = &mut times[..streams.len()];
-    if open < close {
-        sampler.fill_1d(streams, TIME, times);
-        for time in times.iter_mut() {
-            *time = open + *time * (close - open);
-        }
-    }
     let samples = CameraSamples {
         job,
         pixel,
         streams,
-        offsets: &offsets,
-        lenses: &lenses,
-        times,
         starts,
         sampler,
     };
-    job.scene.tracer().kernel().run(samples);
     Group {
         pixel,
         count: streams.len(),
-        offsets,
+        offsets: job.scene.tracer().kernel().run(samples),
     }
 }

@@ -10,14 +10,17 @@
 //! transparency*, 2011; Burley, *Practical hash-based Owen scrambling*, 2020; constants by Vegdahl,
 //! *Building a better LK hash*, 2021).
 
+use crate::lanes::random::unit;
+use crate::lanes::{Ints, Lanes};
+
 /// The second sequence's element `index`, reversed.
-#[inline]
-pub(super) fn second(mut index: u32) -> u32 {
-    index ^= (index >> 1) & 0x5555_5555;
-    index ^= (index >> 2) & 0x3333_3333;
-    index ^= (index >> 4) & 0x0f0f_0f0f;
-    index ^= (index >> 8) & 0x00ff_00ff;
-    index ^ (index >> 16)
+#[inline(always)]
+pub(super) fn second<I: Ints>(index: I) -> I {
+    let index = index ^ (index.shr::<1>() & I::splat(0x5555_5555));
+    let index = index ^ (index.shr::<2>() & I::splat(0x3333_3333));
+    let index = index ^ (index.shr::<4>() & I::splat(0x0f0f_0f0f));
+    let index = index ^ (index.shr::<8>() & I::splat(0x00ff_00ff));
+    index ^ index.shr::<16>()
 }
 
 /// How many of Sobol's sequences there are here.
@@ -44,12 +47,17 @@ const POLYNOMIALS: [(usize, u32, [u32; 6]); SEQUENCES] = [
     (6, 16, [1, 3, 1, 13, 27, 49]),
 ];
 
-/// All direction numbers, reversed.
-const DIRECTIONS: [[u32; 32]; SEQUENCES] = {
-    let mut all = [[0; 32]; SEQUENCES];
+/// All direction numbers, reversed: of each bit of an index, those of all sequences.
+const DIRECTIONS: [[u32; SEQUENCES]; 32] = {
+    let mut all = [[0; SEQUENCES]; 32];
     let mut sequence = 0;
     while sequence < SEQUENCES {
-        all[sequence] = directions(POLYNOMIALS[sequence]);
+        let of_one = directions(POLYNOMIALS[sequence]);
+        let mut bit = 0;
+        while bit < 32 {
+            all[bit][sequence] = of_one[bit];
+            bit += 1;
+        }
         sequence += 1;
     }
     all
@@ -79,38 +87,46 @@ const fn directions((degree, between, first): (usize, u32, [u32; 6])) -> [u32; 3
     v
 }
 
-/// Element `index`, below 2^`bits`, of a sequence, reversed.
-#[inline]
-pub(super) fn sobol(sequence: usize, index: u32, bits: u32) -> u32 {
-    let chosen = (0..bits).zip(&DIRECTIONS[sequence]);
-    chosen.fold(0, |sum, (j, v)| sum ^ (v & (index >> j & 1).wrapping_neg()))
+/// Elements `index`, below 2^`bits`, of some sequences, reversed.
+#[inline(always)]
+pub(super) fn sobol<I: Ints, const N: usize>(sequences: [usize; N], index: I, bits: u32) -> [I; N] {
+    let (mut sums, mut index) = ([I::splat(0); N], index);
+    for directions in &DIRECTIONS[..bits as usize] {
+        let chosen = I::splat(0) - (index & I::splat(1));
+        for n in 0..N {
+            sums[n] = sums[n] ^ (chosen & I::splat(directions[sequences[n]]));
+        }
+        index = index.shr::<1>();
+    }
+    sums
 }
 
 /// Owen's scrambling of a reversed fraction, one for each seed.
-#[inline]
-pub(super) fn scramble(mut reversed: u32, seed: u32) -> u32 {
-    reversed ^= reversed.wrapping_mul(0x3d20_adea);
-    reversed = reversed.wrapping_add(seed);
-    reversed = reversed.wrapping_mul((seed >> 16) | 1);
-    reversed ^= reversed.wrapping_mul(0x0552_6c56);
-    reversed ^ reversed.wrapping_mul(0x53a2_2864)
+#[inline(always)]
+pub(super) fn scramble<I: Ints>(reversed: I, seed: I) -> I {
+    let x = reversed ^ (reversed * I::splat(0x3d20_adea));
+    let x = (x + seed) * (seed.shr::<16>() | I::splat(1));
+    let x = x ^ (x * I::splat(0x0552_6c56));
+    x ^ (x * I::splat(0x53a2_2864))
 }
 
 /// An index's place in a shuffle of 0..`n`, a power of two, that keeps every aligned block of 2^k indices
 /// together, so that the first 2^k points are a net, and so are the next.
-#[inline]
-pub(super) fn shuffle(index: u32, n: u32, seed: u32) -> u32 {
-    scramble(index.reverse_bits(), seed).reverse_bits() & (n - 1)
+#[inline(always)]
+pub(super) fn shuffle<I: Ints>(index: I, n: u32, seed: I) -> I {
+    scramble(index.reverse_bits(), seed).reverse_bits() & I::splat(n - 1)
 }
 
 /// The fraction in [0, 1), cut to 24 bits.
-#[inline]
-pub(super) fn fraction(reversed: u32) -> f32 {
-    (reversed.reverse_bits() >> 8) as f32 * (1.0 / 16_777_216.0)
+#[inline(always)]
+pub(super) fn fraction<F: Lanes>(reversed: F::Int) -> F {
+    unit(reversed.reverse_bits())
 }
 
 #[cfg(test)]
 mod tests {
+    use std::num::Wrapping;
+
     use super::*;
 
     /// By the recurrence of its direction numbers: v₀ = ½, vⱼ₊₁ = vⱼ ⊕ vⱼ/2.
@@ -128,15 +144,16 @@ mod tests {
     #[test]
     fn the_second_sequence_is_that_of_its_direction_numbers() {
         for i in (0..1000).chain([u32::MAX, 0xdead_beef, 1 << 31]) {
-            assert_eq!(second(i).reverse_bits(), second_by_definition(i), "{i}");
+            let found = second(Wrapping(i)).0;
+            assert_eq!(found.reverse_bits(), second_by_definition(i), "{i}");
         }
     }
 
     #[test]
     fn sequences_are_those_of_joe_and_kuo() {
-        let eighths = |sequence| {
-            [1, 2, 3, 4, 5, 6, 7].map(|i| (fraction(sobol(sequence, i, 3)) * 8.0) as u32)
-        };
+        let element = |sequence, i, bits| fraction::<f32>(sobol([sequence], Wrapping(i), bits)[0]);
+        let eighths =
+            |sequence| [1, 2, 3, 4, 5, 6, 7].map(|i| (element(sequence, i, 3) * 8.0) as u32);
         assert_eq!(eighths(2), [4, 6, 2, 3, 7, 5, 1]);
         assert_eq!(eighths(3), [4, 6, 2, 1, 5, 7, 3]);
         // Element 731 as SciPy 1.17 gives it (`qmc.Sobol(16, scramble=False)`, in its order number 877).
@@ -144,26 +161,29 @@ mod tests {
             877, 695, 959, 1009, 259, 917, 219, 741, 1005, 899, 803, 113, 97, 653, 783, 1015,
         ];
         for (sequence, expected) in expected.into_iter().enumerate() {
-            let element = fraction(sobol(sequence, 731, 10)) * 1024.0;
-            assert_eq!(element, expected as f32, "{sequence}");
+            assert_eq!(
+                element(sequence, 731, 10) * 1024.0,
+                expected as f32,
+                "{sequence}"
+            );
         }
-        for i in 0..1000 {
-            assert_eq!((sobol(0, i, 10), sobol(1, i, 10)), (i, second(i)));
+        for i in (0..1000).map(Wrapping) {
+            assert_eq!(sobol([0, 1], i, 10), [i, second(i)]);
         }
     }
 
     #[test]
     fn scrambling_permutes_the_halves_of_every_interval_and_shuffling_blocks_of_indices() {
-        for seed in [0, 1, 0x1234_5678, u32::MAX] {
+        for seed in [0, 1, 0x1234_5678, u32::MAX].map(Wrapping) {
             for k in 1..=10 {
                 let n = 1_u32 << k;
                 let mut seen = vec![[false; 2]; n as usize];
-                for i in 0..n {
-                    seen[(scramble(i, seed) & (n - 1)) as usize][0] = true;
-                    seen[shuffle(i, n, seed) as usize][1] = true;
+                for i in (0..n).map(Wrapping) {
+                    seen[(scramble(i, seed).0 & (n - 1)) as usize][0] = true;
+                    seen[shuffle(i, n, seed).0 as usize][1] = true;
                 }
                 assert!(seen.iter().all(|s| *s == [true; 2]), "{seed} {k}");
-                let half = |i| shuffle(i, n, seed) / n.div_ceil(2);
+                let half = |i| shuffle(Wrapping(i), n, seed).0 / n.div_ceil(2);
                 assert!((0..n / 2).all(|i| half(i) == half(0)));
             }
         }

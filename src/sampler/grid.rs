@@ -3,13 +3,12 @@
 //! cells are visited is random, so that a cell of the pixel does not always meet the same cell of the lens.
 //! No other sampler here is biased, at its full count or before it.
 
-use glam::Vec2;
-
 use super::stratified::Stratified;
-use super::{PointSet, Sampler};
+use super::{PointSet, Sampler, Streams};
 use crate::description::Properties;
 use crate::description::declared::Plugin;
 use crate::error::Result;
+use crate::lanes::{Lanes, Vec2};
 
 /// Strata without jitter; a set is the whole sample count, rounded up to a square.
 #[derive(Clone, Debug)]
@@ -52,11 +51,13 @@ impl PointSet for Grid {
         Sampler::Grid(Self::new(count))
     }
 
-    fn get_1d(&self, key: u64, index: u32, dimension: u32) -> f32 {
-        self.cells.get_1d(key, index, dimension)
+    #[inline(always)]
+    fn number<F: Lanes>(&self, streams: Streams<F>, dimension: u32) -> F {
+        self.cells.number(streams, dimension)
     }
 
-    fn get_2d(&self, key: u64, index: u32, dimension: u32) -> Vec2 {
-        self.cells.get_2d(key, index, dimension)
+    #[inline(always)]
+    fn pair<F: Lanes>(&self, streams: Streams<F>, dimension: u32) -> Vec2<F> {
+        self.cells.pair(streams, dimension)
     }
 }

@@ -1,12 +1,10 @@
 //! `independent`: every coordinate a random number of its own; converges with variance 1/n.
 
-use glam::Vec2;
-
-use super::{PointSet, Sampler, sample_count, units};
+use super::{PointSet, Sampler, Streams, sample_count, units};
 use crate::description::Properties;
 use crate::description::declared::Plugin;
 use crate::error::Result;
-use crate::math::random;
+use crate::lanes::{Lanes, Long, Vec2, random};
 
 /// Independent uniform points; a set is one point.
 #[derive(Clone, Debug)]
@@ -49,13 +47,19 @@ impl PointSet for Independent {
         Sampler::Independent(Self { count })
     }
 
-    #[inline]
-    fn get_1d(&self, key: u64, index: u32, dimension: u32) -> f32 {
-        random::unit(random::bits(random::bits(key, dimension), index))
+    #[inline(always)]
+    fn number<F: Lanes>(&self, streams: Streams<F>, dimension: u32) -> F {
+        random::unit(point(streams, dimension).high)
     }
 
-    #[inline]
-    fn get_2d(&self, key: u64, index: u32, dimension: u32) -> Vec2 {
-        units(random::bits(random::bits(key, dimension), index))
+    #[inline(always)]
+    fn pair<F: Lanes>(&self, streams: Streams<F>, dimension: u32) -> Vec2<F> {
+        units(point(streams, dimension))
     }
+}
+
+/// The random bits of a point.
+#[inline(always)]
+fn point<F: Lanes>(Streams { key, index }: Streams<F>, dimension: u32) -> Long<F::Int> {
+    random::bits_along(random::bits(key, dimension), index)
 }

@@ -3,19 +3,17 @@
 //! each interval of length 4⁻ᵏ and, in pairs, one into each box of area 4⁻ᵏ whose sides are powers of two.
 //! `sobol` does better: its scrambling breaks the alignments that remain here.
 
-use glam::Vec2;
-
 use super::digits::{fraction, second};
-use super::{PointSet, Sampler, place, sample_count};
+use super::{PointSet, Sampler, Streams, place, sample_count};
 use crate::description::Properties;
 use crate::description::declared::Plugin;
 use crate::error::Result;
-use crate::math::random;
+use crate::lanes::{Divisor, Lanes, Vec2, random};
 
 /// A set is the whole sample count, rounded up to a power of four.
 #[derive(Clone, Debug)]
 pub struct LdSampler {
-    count: u32,
+    set: Divisor,
 }
 
 impl LdSampler {
@@ -30,20 +28,21 @@ impl LdSampler {
 
     fn new(count: u32) -> Self {
         let power = count.next_power_of_two();
+        // Mitsuba's least count is 4.
+        let count = (power << (power.trailing_zeros() % 2)).max(4);
         Self {
-            // Mitsuba's least count is 4.
-            count: (power << (power.trailing_zeros() % 2)).max(4),
+            set: Divisor::new(count),
         }
     }
 }
 
 impl PointSet for LdSampler {
     fn sample_count(&self) -> u32 {
-        self.count
+        self.set.value()
     }
 
     fn set_size(&self) -> u32 {
-        self.count
+        self.set.value()
     }
 
     fn counts(&self) -> &'static str {
@@ -54,21 +53,21 @@ impl PointSet for LdSampler {
         Sampler::LdSampler(Self::new(count))
     }
 
-    #[inline]
-    fn get_1d(&self, key: u64, index: u32, dimension: u32) -> f32 {
-        let (key, index) = place(key, index, self.count, dimension);
-        let index = random::permute(index, self.count, key);
-        fraction(index ^ random::mix(key) as u32)
+    #[inline(always)]
+    fn number<F: Lanes>(&self, streams: Streams<F>, dimension: u32) -> F {
+        let Streams { key, index } = place(streams, self.set, dimension);
+        let index = random::permute::<F>(index, self.set, key);
+        fraction(index ^ random::mix(key).low)
     }
 
-    #[inline]
-    fn get_2d(&self, key: u64, index: u32, dimension: u32) -> Vec2 {
-        let (key, index) = place(key, index, self.count, dimension);
-        let index = random::permute(index, self.count, key);
+    #[inline(always)]
+    fn pair<F: Lanes>(&self, streams: Streams<F>, dimension: u32) -> Vec2<F> {
+        let Streams { key, index } = place(streams, self.set, dimension);
+        let index = random::permute::<F>(index, self.set, key);
         let added = random::mix(key);
         Vec2::new(
-            fraction(index ^ added as u32),
-            fraction(second(index) ^ (added >> 32) as u32),
+            fraction(index ^ added.low),
+            fraction(second(index) ^ added.high),
         )
     }
 }

@@ -16,13 +16,12 @@ mod stratified;
 #[cfg(test)]
 mod tests;
 
-use glam::Vec2;
-
 use crate::description::Properties;
 use crate::description::declared::{Row, boolean, integer};
 use crate::error::{Problem, Result};
 use crate::family::{self, family};
-use crate::math::random;
+use crate::lanes::{Call, Divisor, Ints, Lanes, Long, Vec2, random};
+use crate::math;
 
 /// What every sampler does.
 pub trait PointSet: std::fmt::Debug + Send + Sync {
@@ -34,30 +33,20 @@ pub trait PointSet: std::fmt::Debug + Send + Sync {
     fn counts(&self) -> &'static str;
     /// The same sampler for another count, 1 to [`MAX_SAMPLES`], which it may round up.
     fn with_count(&self, count: u32) -> Sampler;
-    /// Coordinate `dimension` of point `index` (counted over all sets of a pixel) in [0, 1); `key` is
-    /// the pixel's.
-    fn get_1d(&self, key: u64, index: u32, dimension: u32) -> f32;
-    /// Coordinates `dimension`, which is even, and `dimension + 1`, placed as a pair.
-    fn get_2d(&self, key: u64, index: u32, dimension: u32) -> Vec2;
-
-    /// Coordinate `dimension` of each sample.
-    fn fill_1d(&self, streams: &[Stream], dimension: u32, out: &mut [f32]) {
-        for (out, stream) in out.iter_mut().zip(streams) {
-            *out = self.get_1d(stream.key, stream.index, dimension);
-        }
-    }
-    /// Coordinates `dimension`, which is even, and `dimension + 1` of each sample.
-    fn fill_2d(&self, streams: &[Stream], dimension: u32, out: &mut [Vec2]) {
-        for (out, stream) in out.iter_mut().zip(streams) {
-            *out = self.get_2d(stream.key, stream.index, dimension);
-        }
-    }
+    /// Coordinate `dimension` of each sample, in [0, 1). Must be `#[inline(always)]`, and so must [`Self::pair`].
+    fn number<F: Lanes>(&self, streams: Streams<F>, dimension: u32) -> F
+    where
+        Self: Sized;
+    /// Coordinates `dimension`, which is even, and `dimension + 1` of each sample, placed as a pair.
+    fn pair<F: Lanes>(&self, streams: Streams<F>, dimension: u32) -> Vec2<F>
+    where
+        Self: Sized;
 }
 
 family! {
     /// Every sampler there is.
     #[derive(Clone, Debug)]
-    pub enum Sampler: PointSet, context () {
+    pub enum Sampler: PointSet, context (), visitor Visitor {
         "grid" => Grid(grid::Grid),
         "independent" => Independent(independent::Independent),
         "ldsampler" => LdSampler(ldsampler::LdSampler),
@@ -81,6 +70,18 @@ impl Sampler {
         (1..=count)
             .contains(&parts)
             .then(|| self.with_count(count.div_ceil(parts)))
+    }
+
+    /// Coordinate `dimension` of each sample, in [0, 1).
+    #[inline(always)]
+    pub fn number<F: Lanes>(&self, streams: Streams<F>, dimension: u32) -> F {
+        F::call(Number(self, streams, dimension))
+    }
+
+    /// Coordinates `dimension`, which is even, and `dimension + 1` of each sample, placed as a pair.
+    #[inline(always)]
+    pub fn pair<F: Lanes>(&self, streams: Streams<F>, dimension: u32) -> Vec2<F> {
+        F::call(Pair(self, streams, dimension))
     }
 
     /// The note that the count which `properties` ask for was rounded up, where it was.
@@ -133,27 +134,79 @@ const DEFAULT_COUNT: i64 = 4;
 /// The most samples a pixel can have.
 pub const MAX_SAMPLES: u32 = 1 << 30;
 
-/// A key of its own for each set and dimension, and the point's index in its set of `n`.
-#[inline]
-fn place(key: u64, index: u32, n: u32, dimension: u32) -> (u64, u32) {
-    // Most samplers' only set is the first: a branch is sooner decided than a division is done.
-    let set = if index < n { 0 } else { index / n };
-    (
-        random::bits(random::bits(key, dimension), set),
-        index - set * n,
-    )
+/// Something to be asked of whichever sampler it is. `visit` must be `#[inline(always)]`.
+trait Visitor {
+    type Output;
+
+    fn visit<P: PointSet>(self, points: &P) -> Self::Output;
+}
+
+/// A sampler, the samples that ask it, and the dimension.
+struct Number<'a, F: Lanes>(&'a Sampler, Streams<F>, u32);
+
+impl<F: Lanes> Call<F> for Number<'_, F> {
+    type Output = F;
+
+    #[inline(always)]
+    fn run(self) -> F {
+        self.0.visit(self)
+    }
+}
+
+impl<F: Lanes> Visitor for Number<'_, F> {
+    type Output = F;
+
+    #[inline(always)]
+    fn visit<P: PointSet>(self, points: &P) -> F {
+        points.number(self.1, self.2)
+    }
+}
+
+/// See [`Number`].
+struct Pair<'a, F: Lanes>(&'a Sampler, Streams<F>, u32);
+
+impl<F: Lanes> Call<F> for Pair<'_, F> {
+    type Output = Vec2<F>;
+
+    #[inline(always)]
+    fn run(self) -> Vec2<F> {
+        self.0.visit(self)
+    }
+}
+
+impl<F: Lanes> Visitor for Pair<'_, F> {
+    type Output = Vec2<F>;
+
+    #[inline(always)]
+    fn visit<P: PointSet>(self, points: &P) -> Vec2<F> {
+        points.pair(self.1, self.2)
+    }
+}
+
+/// A key of its own for each set and dimension, and the points' indices in their sets.
+#[inline(always)]
+fn place<F: Lanes>(streams: Streams<F>, set: Divisor, dimension: u32) -> Streams<F> {
+    let (sets, index) = set.divide(streams.index);
+    let key = random::bits_along(random::bits(streams.key, dimension), sets);
+    Streams { key, index }
 }
 
 /// Two numbers in [0, 1), each uniform on multiples of 2⁻²⁴.
-#[inline]
-fn units(bits: u64) -> Vec2 {
-    Vec2::new(random::unit(bits), random::unit(bits << 32))
+#[inline(always)]
+fn units<F: Lanes>(bits: Long<F::Int>) -> Vec2<F> {
+    Vec2::new(random::unit(bits.high), random::unit(bits.low))
 }
 
-/// The largest number below 1: coordinates that rounding brings to 1 are put here.
-#[inline]
-fn below_one() -> f32 {
-    1f32.next_down()
+/// How many there are of what is counted by dividing.
+#[inline(always)]
+fn count<F: Lanes>(divisor: Divisor) -> F {
+    F::splat(divisor.value() as f32)
+}
+
+/// Coordinates that rounding brings to 1 become the largest number below.
+#[inline(always)]
+fn below_one<F: Lanes>(coordinate: F) -> F {
+    coordinate.min(F::splat(1f32.next_down()))
 }
 
 /// One sample's place in the sequence of its pixel.
@@ -173,20 +226,44 @@ impl Stream {
     pub fn new(seed: u64, x: u32, y: u32, index: u32) -> Self {
         let pixel = u64::from(x) | u64::from(y) << 32;
         Self {
-            key: random::key(random::key(0, seed), pixel),
+            key: math::random::key(math::random::key(0, seed), pixel),
             index,
         }
     }
 
     /// Its number in `dimension`.
-    #[inline]
     pub fn number(&self, sampler: &Sampler, dimension: u32) -> f32 {
-        sampler.get_1d(self.key, self.index, dimension)
+        sampler.number::<f32>(Streams::of(&[*self]), dimension)
     }
 
     /// Its numbers in `dimension`, which is even, and the next one.
-    #[inline]
-    pub fn pair(&self, sampler: &Sampler, dimension: u32) -> Vec2 {
-        sampler.get_2d(self.key, self.index, dimension)
+    pub fn pair(&self, sampler: &Sampler, dimension: u32) -> glam::Vec2 {
+        sampler.pair::<f32>(Streams::of(&[*self]), dimension).into()
+    }
+}
+
+/// Streams in lanes.
+#[derive(Clone, Copy, Debug)]
+pub struct Streams<F: Lanes> {
+    key: Long<F::Int>,
+    index: F::Int,
+}
+
+impl<F: Lanes> Streams<F> {
+    /// The first of a slice; lanes beyond its end are those of no pixel.
+    #[inline(always)]
+    pub fn of(streams: &[Stream]) -> Self {
+        let [mut low, mut high, mut index] = [<F::Int as Ints>::ROW; 3];
+        for (lane, stream) in streams.iter().take(F::WIDTH).enumerate() {
+            (low[lane], high[lane]) = (stream.key as u32, (stream.key >> 32) as u32);
+            index[lane] = stream.index;
+        }
+        let [low, high, index] = [
+            F::Int::load(&low),
+            F::Int::load(&high),
+            F::Int::load(&index),
+        ];
+        let key = Long { low, high };
+        Self { key, index }
     }
 }

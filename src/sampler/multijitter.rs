@@ -4,20 +4,19 @@
 //! σ(j) and in the row's part τ(i), where the permutations σ and τ are the same for all cells, which keeps
 //! neighbours apart.
 
-use glam::Vec2;
-
 use super::stratified::{jittered, offset};
-use super::{PointSet, Sampler, below_one, place, sample_count};
+use super::{PointSet, Sampler, Streams, below_one, count, place, sample_count};
 use crate::description::Properties;
 use crate::description::declared::Plugin;
 use crate::error::Result;
-use crate::math::random;
+use crate::lanes::{Divisor, Ints as _, Lanes, Vec2, random};
 
 /// A set is the whole sample count, rounded up to a product of near equals.
 #[derive(Clone, Debug)]
 pub struct MultiJitter {
-    columns: u32,
-    rows: u32,
+    set: Divisor,
+    columns: Divisor,
+    rows: Divisor,
     /// Whether points lie anywhere in the smallest strata, or at their centres.
     jitter: bool,
 }
@@ -35,9 +34,11 @@ impl MultiJitter {
 
     fn new(count: u32, jitter: bool) -> Self {
         let columns = count.isqrt();
+        let rows = count.div_ceil(columns);
         Self {
-            columns,
-            rows: count.div_ceil(columns),
+            set: Divisor::new(columns * rows),
+            columns: Divisor::new(columns),
+            rows: Divisor::new(rows),
             jitter,
         }
     }
@@ -49,7 +50,7 @@ impl PointSet for MultiJitter {
     }
 
     fn set_size(&self) -> u32 {
-        self.columns * self.rows
+        self.set.value()
     }
 
     fn counts(&self) -> &'static str {
@@ -60,23 +61,24 @@ impl PointSet for MultiJitter {
         Sampler::MultiJitter(Self::new(count, self.jitter))
     }
 
-    #[inline]
-    fn get_1d(&self, key: u64, index: u32, dimension: u32) -> f32 {
-        jittered(key, index, dimension, self.set_size(), self.jitter)
+    #[inline(always)]
+    fn number<F: Lanes>(&self, streams: Streams<F>, dimension: u32) -> F {
+        jittered(streams, dimension, self.set, self.jitter)
     }
 
-    #[inline]
-    fn get_2d(&self, key: u64, index: u32, dimension: u32) -> Vec2 {
-        let size = self.set_size();
-        let (key, index) = place(key, index, size, dimension);
-        let cell = random::permute(index, size, key);
-        let (i, j) = (cell % self.columns, cell / self.columns);
-        let part = Vec2::new(
-            random::permute(j, self.rows, random::bits(key, u32::MAX)) as f32,
-            random::permute(i, self.columns, random::bits(key, u32::MAX - 1)) as f32,
-        );
-        let grid = Vec2::new(self.columns as f32, self.rows as f32);
-        let within = (part + offset(key, cell, self.jitter)) / Vec2::new(grid.y, grid.x);
-        ((Vec2::new(i as f32, j as f32) + within) / grid).min(Vec2::splat(below_one()))
+    #[inline(always)]
+    fn pair<F: Lanes>(&self, streams: Streams<F>, dimension: u32) -> Vec2<F> {
+        let Streams { key, index } = place(streams, self.set, dimension);
+        let cell = random::permute::<F>(index, self.set, key);
+        let (j, i) = self.columns.divide(cell);
+        let key_x = random::bits(key, u32::MAX);
+        let key_y = random::bits(key, u32::MAX - 1);
+        let part_x: F = random::permute::<F>(j, self.rows, key_x).to_float();
+        let part_y: F = random::permute::<F>(i, self.columns, key_y).to_float();
+        let (columns, rows) = (count::<F>(self.columns), count::<F>(self.rows));
+        let within = offset(key, cell, self.jitter);
+        let x = (i.to_float() + (part_x + within.x) / rows) / columns;
+        let y = (j.to_float() + (part_y + within.y) / columns) / rows;
+        Vec2::new(below_one(x), below_one(y))
     }
 }

@@ -5,19 +5,18 @@
 //! a + b, 2a + b, … mod p in the block's dimensions, which are p + 1; permutations of each dimension's
 //! digits, and within a digit's stratum the partner's digit (correlated multi-jitter), do the rest.
 
-use glam::Vec2;
-
 use super::stratified::offset;
-use super::{PointSet, Sampler, below_one, place, sample_count};
+use super::{PointSet, Sampler, Streams, below_one, count, place, sample_count};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, Row, integer};
 use crate::error::{Error, Result};
-use crate::math::random;
+use crate::lanes::{Divisor, Ints, Lanes, Long, Vec2, random};
 
 /// A set is the whole sample count, rounded up to the square of a prime.
 #[derive(Clone, Debug)]
 pub struct Orthogonal {
-    prime: u32,
+    prime: Divisor,
+    set: Divisor,
     /// Dimensions that share an array: an even number, for pairs must not be parted.
     block: u32,
     /// Whether points lie anywhere in the smallest strata, or at their centres.
@@ -52,39 +51,46 @@ impl Orthogonal {
             .find(|&n| is_prime(n))
             .expect("there is a larger prime");
         Self {
-            prime,
+            prime: Divisor::new(prime),
+            set: Divisor::new(prime * prime),
             block: (prime + 1) & !1,
             jitter,
         }
     }
 
     /// The point's number in the array that the block of `dimension` has to itself.
-    #[inline]
-    fn row(&self, key: u64, index: u32, dimension: u32) -> (u64, u32) {
-        let n = self.set_size();
-        let (key, index) = place(key, index, n, dimension / self.block);
-        (key, random::permute(index, n, key))
+    #[inline(always)]
+    fn row<F: Lanes>(&self, streams: Streams<F>, dimension: u32) -> (Long<F::Int>, F::Int) {
+        let Streams { key, index } = place(streams, self.set, dimension / self.block);
+        (key, random::permute::<F>(index, self.set, key))
     }
 
     /// A point's digit in a column of the array, before any permutation.
-    #[inline]
-    fn digit(&self, row: u32, column: u32) -> u32 {
-        let (a, b) = (row / self.prime, row % self.prime);
+    #[inline(always)]
+    fn digit<I: Ints>(&self, row: I, column: u32) -> I {
+        let (a, b) = self.prime.divide(row);
         match column {
             0 => a,
             // Both factors are below 2^15, or a little above: see MAX_SAMPLES.
-            _ => ((column - 1) * a + b) % self.prime,
+            _ => self.prime.divide(I::splat(column - 1) * a + b).1,
         }
     }
 
     /// A coordinate from its own digit and that of its partner; `within` is the place in the smallest
     /// stratum.
-    #[inline]
-    fn coordinate(&self, key: u64, digit: u32, partner: u32, within: f32) -> f32 {
-        let p = self.prime as f32;
-        let stratum = random::permute(digit, self.prime, key);
-        let part = random::permute(partner, self.prime, random::bits(key, 0));
-        ((stratum as f32 + (part as f32 + within) / p) / p).min(below_one())
+    #[inline(always)]
+    fn coordinate<F: Lanes>(
+        &self,
+        key: Long<F::Int>,
+        digit: F::Int,
+        partner: F::Int,
+        within: F,
+    ) -> F {
+        let p = count::<F>(self.prime);
+        let stratum: F = random::permute::<F>(digit, self.prime, key).to_float();
+        let key = random::bits(key, 0);
+        let part: F = random::permute::<F>(partner, self.prime, key).to_float();
+        below_one((stratum + (part + within) / p) / p)
     }
 }
 
@@ -94,7 +100,7 @@ impl PointSet for Orthogonal {
     }
 
     fn set_size(&self) -> u32 {
-        self.prime * self.prime
+        self.set.value()
     }
 
     fn counts(&self) -> &'static str {
@@ -105,25 +111,26 @@ impl PointSet for Orthogonal {
         Sampler::Orthogonal(Self::new(count, self.jitter))
     }
 
-    #[inline]
-    fn get_1d(&self, key: u64, index: u32, dimension: u32) -> f32 {
-        let (key, row) = self.row(key, index, dimension);
+    #[inline(always)]
+    fn number<F: Lanes>(&self, streams: Streams<F>, dimension: u32) -> F {
+        let (key, row) = self.row(streams, dimension);
         let column = dimension % self.block;
         let (digit, partner) = (self.digit(row, column), self.digit(row, column ^ 1));
         let key = random::bits(key, column);
-        self.coordinate(key, digit, partner, offset(key, row, self.jitter).x)
+        let within = offset::<F>(key, row, self.jitter);
+        self.coordinate(key, digit, partner, within.x)
     }
 
-    #[inline]
-    fn get_2d(&self, key: u64, index: u32, dimension: u32) -> Vec2 {
-        let (key, row) = self.row(key, index, dimension);
+    #[inline(always)]
+    fn pair<F: Lanes>(&self, streams: Streams<F>, dimension: u32) -> Vec2<F> {
+        let (key, row) = self.row(streams, dimension);
         let column = dimension % self.block;
         let (x, y) = (self.digit(row, column), self.digit(row, column + 1));
-        let keys = [random::bits(key, column), random::bits(key, column + 1)];
-        let within = offset(keys[0], row, self.jitter);
+        let (key_x, key_y) = (random::bits(key, column), random::bits(key, column + 1));
+        let within = offset::<F>(key_x, row, self.jitter);
         Vec2::new(
-            self.coordinate(keys[0], x, y, within.x),
-            self.coordinate(keys[1], y, x, within.y),
+            self.coordinate(key_x, x, y, within.x),
+            self.coordinate(key_y, y, x, within.y),
         )
     }
 }

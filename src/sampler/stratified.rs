@@ -2,19 +2,18 @@
 //! points puts one into each of n intervals of every dimension and, in pairs, one into each cell of a
 //! grid of √n × √n; each dimension visits its strata in a permutation of its own.
 
-use glam::Vec2;
-
-use super::{PointSet, Sampler, below_one, place, sample_count, units};
+use super::{PointSet, Sampler, Streams, below_one, count, place, sample_count, units};
 use crate::description::Properties;
 use crate::description::declared::Plugin;
 use crate::error::Result;
-use crate::math::random;
+use crate::lanes::{Divisor, Ints as _, Lanes, Long, Vec2, random};
 
 /// Jittered points; a set is the whole sample count, rounded up to a square.
 #[derive(Clone, Debug)]
 pub struct Stratified {
     /// Strata along each axis of a pair.
-    side: u32,
+    side: Divisor,
+    set: Divisor,
     /// Whether points lie anywhere in their stratum, or at its centre.
     jitter: bool,
 }
@@ -32,8 +31,10 @@ impl Stratified {
 
     pub(super) fn new(count: u32, jitter: bool) -> Self {
         let root = count.isqrt();
+        let side = root + u32::from(root * root < count);
         Self {
-            side: root + u32::from(root * root < count),
+            side: Divisor::new(side),
+            set: Divisor::new(side * side),
             jitter,
         }
     }
@@ -45,7 +46,7 @@ impl PointSet for Stratified {
     }
 
     fn set_size(&self) -> u32 {
-        self.side * self.side
+        self.set.value()
     }
 
     fn counts(&self) -> &'static str {
@@ -56,43 +57,46 @@ impl PointSet for Stratified {
         Sampler::Stratified(Self::new(count, self.jitter))
     }
 
-    #[inline]
-    fn get_1d(&self, key: u64, index: u32, dimension: u32) -> f32 {
-        jittered(key, index, dimension, self.set_size(), self.jitter)
+    #[inline(always)]
+    fn number<F: Lanes>(&self, streams: Streams<F>, dimension: u32) -> F {
+        jittered(streams, dimension, self.set, self.jitter)
     }
 
-    #[inline]
-    fn get_2d(&self, key: u64, index: u32, dimension: u32) -> Vec2 {
-        let n = self.set_size();
-        let (key, index) = place(key, index, n, dimension);
-        // One stratum is neither looked for nor scaled.
-        if n == 1 {
-            return offset(key, 0, self.jitter);
-        }
-        let stratum = random::permute(index, n, key);
-        let cell = Vec2::new((stratum % self.side) as f32, (stratum / self.side) as f32);
+    #[inline(always)]
+    fn pair<F: Lanes>(&self, streams: Streams<F>, dimension: u32) -> Vec2<F> {
+        let Streams { key, index } = place(streams, self.set, dimension);
+        let stratum = random::permute::<F>(index, self.set, key);
+        let (row, column) = self.side.divide(stratum);
         let within = offset(key, stratum, self.jitter);
-        ((cell + within) / self.side as f32).min(Vec2::splat(below_one()))
+        let side = count::<F>(self.side);
+        let (x, y): (F, F) = (column.to_float(), row.to_float());
+        Vec2::new(
+            below_one((x + within.x) / side),
+            below_one((y + within.y) / side),
+        )
     }
 }
 
-/// One coordinate in a stratum of its own for each of the `n` points of a set.
-#[inline]
-pub(super) fn jittered(key: u64, index: u32, dimension: u32, n: u32, jitter: bool) -> f32 {
-    let (key, index) = place(key, index, n, dimension);
-    if n == 1 {
-        return offset(key, 0, jitter).x;
-    }
-    let stratum = random::permute(index, n, key);
-    ((stratum as f32 + offset(key, stratum, jitter).x) / n as f32).min(below_one())
+/// One coordinate in a stratum of its own for each of the points of a set.
+#[inline(always)]
+pub(super) fn jittered<F: Lanes>(
+    streams: Streams<F>,
+    dimension: u32,
+    set: Divisor,
+    jitter: bool,
+) -> F {
+    let Streams { key, index } = place(streams, set, dimension);
+    let stratum = random::permute::<F>(index, set, key);
+    let number: F = stratum.to_float();
+    below_one((number + offset::<F>(key, stratum, jitter).x) / count::<F>(set))
 }
 
 /// Where a point lies within its stratum.
-#[inline]
-pub(super) fn offset(key: u64, stratum: u32, jitter: bool) -> Vec2 {
+#[inline(always)]
+pub(super) fn offset<F: Lanes>(key: Long<F::Int>, stratum: F::Int, jitter: bool) -> Vec2<F> {
     if jitter {
-        units(random::bits(key, stratum))
+        units(random::bits_along(key, stratum))
     } else {
-        Vec2::splat(0.5)
+        Vec2::new(F::splat(0.5), F::splat(0.5))
     }
 }

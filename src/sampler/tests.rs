@@ -2,9 +2,24 @@
 
 use std::path::Path;
 
+use glam::Vec2;
+
 use super::*;
 use crate::description::{Description, Kind, Options};
 use crate::error::Error;
+use crate::lanes::{Kernel, MAX_LANES, Task};
+use crate::math::random;
+
+/// Single points, of the pixel that has `key`.
+impl Sampler {
+    fn get_1d(&self, key: u64, index: u32, dimension: u32) -> f32 {
+        Stream { key, index }.number(self, dimension)
+    }
+
+    fn get_2d(&self, key: u64, index: u32, dimension: u32) -> Vec2 {
+        Stream { key, index }.pair(self, dimension)
+    }
+}
 
 /// A sampler as a scene file asks for it, and the note on its count.
 fn build(name: &str, inside: &str) -> Result<(Sampler, Option<Problem>)> {
@@ -514,4 +529,47 @@ fn a_parted_sampler_gives_independent_parts_of_the_same_kind() {
         "{}",
         spread / error
     );
+}
+
+/// The bits of numbers and pairs of samples.
+struct Points<'a>(&'a Sampler, &'a [Stream], u32);
+
+impl Task for Points<'_> {
+    type Output = Vec<[u32; 3]>;
+
+    #[inline(always)]
+    fn run<F: Lanes>(self) -> Self::Output {
+        let Self(sampler, streams, dimension) = self;
+        let mut all = Vec::new();
+        for some in streams.chunks(F::WIDTH) {
+            let streams = Streams::<F>::of(some);
+            let number: F = sampler.number(streams, dimension);
+            let pair: crate::lanes::Vec2<F> = sampler.pair(streams, dimension);
+            let numbers = [number, pair.x, pair.y];
+            all.extend((0..some.len()).map(|lane| numbers.map(|x| x.lane(lane).to_bits())));
+        }
+        all
+    }
+}
+
+#[test]
+fn every_kernel_draws_the_same_bits() {
+    for count in [1, 7, 64, 1000, MAX_SAMPLES] {
+        for (name, sampler) in every_sampler(count) {
+            let indices = [0, 1, 5, 63, 64, 999, 1 << 20, u32::MAX];
+            let streams = (0..9).flat_map(|x| indices.map(|index| Stream::new(3, x, 1, index)));
+            let streams: Vec<Stream> = streams.take(4 * MAX_LANES + 3).collect();
+            for dimension in [0, 14, 200] {
+                let points = |kernel: Kernel| kernel.run(Points(&sampler, &streams, dimension));
+                let expected = points(Kernel::all()[0]);
+                for kernel in Kernel::all() {
+                    assert!(
+                        points(kernel) == expected,
+                        "{name} {count} {}",
+                        kernel.name()
+                    );
+                }
+            }
+        }
+    }
 }

@@ -8,7 +8,6 @@ use super::{Bounds, Geometry, Shape, Surface, SurfaceSample};
 use crate::description::Properties;
 use crate::error::{Problem, Result};
 use crate::interaction::{Hit, Interaction, Ray};
-use crate::math::Frame;
 use crate::mesh::{Mesh, Time};
 
 /// A mesh with its vertices at two times or more.
@@ -223,24 +222,7 @@ impl Surface for DeformingMesh {
             let normal = normal.map(|(a, b)| between(*a, *b, moment.part));
             triangles.place(0, corner, positions[corner], normal);
         }
-        let surface = triangles.surface();
-        let frame = Frame::from(surface.frame);
-        Interaction {
-            t: hit.t,
-            position: surface.position.into(),
-            error: surface.error.into(),
-            normal: surface.normal.into(),
-            frame,
-            uv: surface.uv.into(),
-            dp_du: surface.dp_du.into(),
-            dp_dv: surface.dp_dv.into(),
-            wi: frame.to_local(-ray.direction),
-            time: ray.time,
-            shape: hit.shape,
-            primitive: hit.primitive,
-            mesh: Some(self.mesh()),
-            barycentric,
-        }
+        triangles.surface().interaction(self.mesh(), ray, hit)
     }
 
     /// At the first time.

@@ -16,7 +16,6 @@ use crate::description::Properties;
 use crate::error::Result;
 use crate::interaction::{Hit, Interaction, Ray};
 use crate::lanes::{self, Lanes, Mask as _, warp};
-use crate::math::Frame;
 use crate::math::distribution::Discrete;
 use crate::mesh::{Loaded, Mesh, MeshFile, ReadOptions};
 pub use triangles::Triangles;
@@ -267,24 +266,7 @@ impl Surface for TriangleMesh {
     fn interaction(&self, ray: &Ray, hit: &Hit) -> Interaction<'_> {
         let mut triangles = Triangles::<f32>::default();
         triangles.set(0, self, hit.primitive, Vec2::new(hit.u, hit.v));
-        let surface = triangles.surface();
-        let frame = Frame::from(surface.frame);
-        Interaction {
-            t: hit.t,
-            position: surface.position.into(),
-            error: surface.error.into(),
-            normal: surface.normal.into(),
-            frame,
-            uv: surface.uv.into(),
-            dp_du: surface.dp_du.into(),
-            dp_dv: surface.dp_dv.into(),
-            wi: frame.to_local(-ray.direction),
-            time: ray.time,
-            shape: hit.shape,
-            primitive: hit.primitive,
-            mesh: Some(&self.mesh),
-            barycentric: Vec2::new(hit.u, hit.v),
-        }
+        triangles.surface().interaction(&self.mesh, ray, hit)
     }
 
     fn area(&self) -> f64 {

@@ -65,11 +65,13 @@ impl Picture {
     /// # Errors
     /// Where the budget does not allow it.
     pub fn into_texels<C: ColorModel>(self, color: &C, role: Role) -> Result<C::Texels> {
-        let count = self.pixels.count();
-        let bytes = C::texel_bytes(&self.pixels);
-        self.account.take_rows(count, bytes)?;
-        let texels = color.texels(&self.pixels, role);
-        self.account.keep((count * bytes) as u64);
+        let Self {
+            pixels, account, ..
+        } = self;
+        let (count, bytes) = (pixels.count(), C::texel_bytes(&pixels));
+        account.take_rows(count, bytes)?;
+        let texels = color.texels(pixels, role);
+        account.keep((count * bytes) as u64);
         Ok(texels)
     }
 }

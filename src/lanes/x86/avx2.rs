@@ -266,6 +266,21 @@ impl Ints for U32x8 {
         unsafe { Self(_mm256_min_epu32(self.0, other.0)) }
     }
     #[inline(always)]
+    fn mul_high(self, other: Self) -> Self {
+        // SAFETY: see the module.
+        unsafe {
+            let even = _mm256_mul_epu32(self.0, other.0);
+            let odd = _mm256_mul_epu32(
+                _mm256_srli_epi64::<32>(self.0),
+                _mm256_srli_epi64::<32>(other.0),
+            );
+            Self(_mm256_blend_epi32::<0b1010_1010>(
+                _mm256_srli_epi64::<32>(even),
+                odd,
+            ))
+        }
+    }
+    #[inline(always)]
     fn select(mask: M8, yes: Self, no: Self) -> Self {
         // SAFETY: see the module.
         unsafe { Self(_mm256_blendv_epi8(no.0, yes.0, _mm256_castps_si256(mask.0))) }

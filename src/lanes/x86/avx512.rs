@@ -287,6 +287,22 @@ impl Ints for U32x16 {
         unsafe { Self(_mm512_min_epu32(self.0, other.0)) }
     }
     #[inline(always)]
+    fn mul_high(self, other: Self) -> Self {
+        // SAFETY: see the module.
+        unsafe {
+            let even = _mm512_mul_epu32(self.0, other.0);
+            let odd = _mm512_mul_epu32(
+                _mm512_srli_epi64::<32>(self.0),
+                _mm512_srli_epi64::<32>(other.0),
+            );
+            Self(_mm512_mask_blend_epi32(
+                0xaaaa,
+                _mm512_srli_epi64::<32>(even),
+                odd,
+            ))
+        }
+    }
+    #[inline(always)]
     fn select(mask: M16, yes: Self, no: Self) -> Self {
         // SAFETY: see the module.
         unsafe { Self(_mm512_mask_blend_epi32(mask.0, no.0, yes.0)) }

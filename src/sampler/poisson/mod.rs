@@ -9,14 +9,12 @@ mod pattern;
 
 use std::sync::Arc;
 
-use glam::Vec2;
-
 use super::stratified::jittered;
-use super::{PointSet, Sampler, below_one, place, sample_count, units};
+use super::{PointSet, Sampler, Streams, below_one, place, sample_count, units};
 use crate::description::Properties;
 use crate::description::declared::Plugin;
 use crate::error::Result;
-use crate::math::random;
+use crate::lanes::{Divisor, Ints as _, Lanes, Vec2, random};
 
 /// The most points of a pattern: half a million bytes of patterns would leave the caches.
 const MAX_POINTS: u32 = 1024;
@@ -28,9 +26,9 @@ const PATTERNS: u32 = 8;
 #[derive(Clone, Debug)]
 pub struct Poisson {
     count: u32,
-    size: u32,
-    /// The points of all patterns, one pattern after another.
-    points: Arc<[Vec2]>,
+    set: Divisor,
+    /// The x and the y of the points of all patterns, one pattern after another.
+    points: Arc<[Vec<f32>; 2]>,
 }
 
 impl Poisson {
@@ -47,10 +45,11 @@ impl Poisson {
         let sets = count.div_ceil(MAX_POINTS);
         let size = count.div_ceil(sets);
         let points = (0..PATTERNS).flat_map(|seed| pattern::discs(size, u64::from(seed)));
+        let (x, y) = points.map(|point| (point.x, point.y)).unzip();
         Self {
             count: sets * size,
-            size,
-            points: points.collect(),
+            set: Divisor::new(size),
+            points: Arc::new([x, y]),
         }
     }
 }
@@ -61,7 +60,7 @@ impl PointSet for Poisson {
     }
 
     fn set_size(&self) -> u32 {
-        self.size
+        self.set.value()
     }
 
     fn counts(&self) -> &'static str {
@@ -72,28 +71,30 @@ impl PointSet for Poisson {
         Sampler::Poisson(Self::new(count))
     }
 
-    #[inline]
-    fn get_1d(&self, key: u64, index: u32, dimension: u32) -> f32 {
-        jittered(key, index, dimension, self.size, true)
+    #[inline(always)]
+    fn number<F: Lanes>(&self, streams: Streams<F>, dimension: u32) -> F {
+        jittered(streams, dimension, self.set, true)
     }
 
-    #[inline]
-    fn get_2d(&self, key: u64, index: u32, dimension: u32) -> Vec2 {
-        let (key, index) = place(key, index, self.size, dimension);
-        let place = random::permute(index, self.size, key);
-        let chance = random::mix(key);
-        let pattern = (chance >> 3) as u32 % PATTERNS;
-        let mut point = self.points[(pattern * self.size + place) as usize];
-        if chance & 1 != 0 {
-            point.x = -point.x;
-        }
-        if chance & 2 != 0 {
-            point.y = -point.y;
-        }
-        if chance & 4 != 0 {
-            point = Vec2::new(point.y, point.x);
-        }
-        let moved = point + units(random::bits(key, 0));
-        (moved - moved.floor()).min(Vec2::splat(below_one()))
+    #[inline(always)]
+    fn pair<F: Lanes>(&self, streams: Streams<F>, dimension: u32) -> Vec2<F> {
+        let Streams { key, index } = place(streams, self.set, dimension);
+        let place = random::permute::<F>(index, self.set, key);
+        let chance = random::mix(key).low;
+        let pattern = chance.shr::<3>() & F::Int::splat(PATTERNS - 1);
+        let point = pattern * F::Int::splat(self.set.value()) + place;
+        let [x, y] = &*self.points;
+        let (x, y) = (F::gather(x, point), F::gather(y, point));
+        let bit = F::Int::splat(1);
+        let x: F = (x.to_bits() ^ (chance & bit).shl::<31>()).from_bits();
+        let y: F = (y.to_bits() ^ (chance.shr::<1>() & bit).shl::<31>()).from_bits();
+        let turned = (chance.shr::<2>() & bit).eq(bit);
+        let moved = units::<F>(random::bits(key, 0));
+        let x_moved = F::select(turned, y, x) + moved.x;
+        let y_moved = F::select(turned, x, y) + moved.y;
+        Vec2::new(
+            below_one(x_moved - x_moved.floor()),
+            below_one(y_moved - y_moved.floor()),
+        )
     }
 }

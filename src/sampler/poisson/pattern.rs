@@ -6,8 +6,12 @@
 //! *Gaussian blue noise* (2022), but with 14 neighbours a point and no exponentials. They stop at the
 //! distance that is wanted, long before they would freeze into a lattice.
 
+use std::num::Wrapping;
+
 use glam::{DVec2, Vec2};
 
+use crate::lanes::random::permute;
+use crate::lanes::{Divisor, Long};
 use crate::math::random;
 
 /// The distance to reach, in hexagonal distances.
@@ -59,9 +63,10 @@ pub(super) fn discs(n: u32, seed: u64) -> Vec<Vec2> {
 /// Points in strata chosen at random.
 fn jittered(n: u32, key: u64) -> Vec<DVec2> {
     let side = n.isqrt() + u32::from(n.isqrt().pow(2) < n);
+    let cells = Divisor::new(side * side);
     (0..n)
         .map(|i| {
-            let cell = random::permute(i, side * side, key);
+            let cell = permute::<f32>(Wrapping(i), cells, Long::splat(key)).0;
             let unit = |axis| f64::from(random::unit(random::bits(key, 2 * i + axis)));
             let cell = DVec2::new((cell % side).into(), (cell / side).into());
             (cell + DVec2::new(unit(0), unit(1))) / f64::from(side)

@@ -2,8 +2,10 @@
 //! arithmetic.
 
 use super::TriangleMesh;
-use crate::interaction::offset;
+use crate::interaction::{Hit, Interaction, Ray, offset};
 use crate::lanes::{Doubles as _, Frame, Lanes, Vec2, Vec3};
+use crate::math;
+use crate::mesh::Mesh;
 
 /// Rows of `N` components of each of the three corners.
 type Corners<F, const N: usize> = [[<F as Lanes>::Row; N]; 3];
@@ -37,6 +39,29 @@ pub struct TrianglePoints<F> {
     pub dp_du: Vec3<F>,
     /// How it changes with v.
     pub dp_dv: Vec3<F>,
+}
+
+impl TrianglePoints<f32> {
+    /// The point that `ray` has met on a triangle of the mesh, by its `hit`.
+    pub(crate) fn interaction<'a>(self, mesh: &'a Mesh, ray: &Ray, hit: &Hit) -> Interaction<'a> {
+        let frame = math::Frame::from(self.frame);
+        Interaction {
+            t: hit.t,
+            position: self.position.into(),
+            error: self.error.into(),
+            normal: self.normal.into(),
+            frame,
+            uv: self.uv.into(),
+            dp_du: self.dp_du.into(),
+            dp_dv: self.dp_dv.into(),
+            wi: frame.to_local(-ray.direction),
+            time: ray.time,
+            shape: hit.shape,
+            primitive: hit.primitive,
+            mesh: Some(mesh),
+            barycentric: glam::Vec2::new(hit.u, hit.v),
+        }
+    }
 }
 
 /// Second and third coordinate at the corners of a triangle without texture coordinates, as it is and turned over: as in
