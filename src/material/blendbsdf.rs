@@ -3,8 +3,8 @@
 //! energy; here a direction that only one of them can draw carries the weight of that one alone.
 
 use super::{
-    BlockBsdf, Bsdf, BsdfSamples, BsdfValues, Lobes, Material, PhongBsdf, PhongTerms, fraction,
-    nested, single_face,
+    BlockBsdf, Bsdf, BsdfSamples, BsdfValues, Lobes, Material, PhongTerms, fraction, nested,
+    single_face,
 };
 use crate::color::{ColorModel, Mono};
 use crate::description::declared::{Plugin, nested as nested_row, number};
@@ -107,6 +107,24 @@ impl<C: ColorModel> BlockBsdf<C> for BlendBsdf<C> {
             ..either
         }
     }
+
+    #[inline(always)]
+    fn phong_lanes<F: Lanes>(
+        &self,
+        at: &Points<'_, F>,
+        wi: Vec3<F>,
+        wo: Vec3<F>,
+        w: &[C::Wavelengths],
+    ) -> Option<PhongTerms<C::Columns<F>>> {
+        let weight = self.weight.numbers(at).clamp(0.0, 1.0);
+        let first = self.nested[0].phong_lanes(at, wi, wo, w);
+        let second = self.nested[1].phong_lanes(at, wi, wo, w);
+        let (first, second) = (first.weighted(F::one() - weight), second.weighted(weight));
+        Some(PhongTerms {
+            diffuse: first.diffuse + second.diffuse,
+            specular: first.specular + second.specular,
+        })
+    }
 }
 
 impl<C: ColorModel> BlendBsdf<C> {
@@ -129,25 +147,5 @@ impl<C: ColorModel> BlendBsdf<C> {
             return of_second;
         }
         BsdfSamples::select(second, of_second, a.sample_lanes(at, wi, u1, u2, w))
-    }
-}
-
-impl<C: ColorModel> PhongBsdf<C> for BlendBsdf<C> {
-    #[inline(always)]
-    fn phong_lanes<F: Lanes>(
-        &self,
-        at: &Points<'_, F>,
-        wi: Vec3<F>,
-        wo: Vec3<F>,
-        w: &[C::Wavelengths],
-    ) -> PhongTerms<C::Columns<F>> {
-        let weight = self.weight.numbers(at).clamp(0.0, 1.0);
-        let first = self.nested[0].phong_lanes(at, wi, wo, w);
-        let second = self.nested[1].phong_lanes(at, wi, wo, w);
-        let (first, second) = (first.weighted(F::one() - weight), second.weighted(weight));
-        PhongTerms {
-            diffuse: first.diffuse + second.diffuse,
-            specular: first.specular + second.specular,
-        }
     }
 }

@@ -154,18 +154,6 @@ impl<S> PhongTerms<S> {
     }
 }
 
-/// A material in lanes that has a part in Phong's equation.
-pub(super) trait PhongBsdf<C: ColorModel> {
-    /// Its terms.
-    fn phong_lanes<F: Lanes>(
-        &self,
-        at: &Points<'_, F>,
-        wi: Vec3<F>,
-        wo: Vec3<F>,
-        w: &[C::Wavelengths],
-    ) -> PhongTerms<C::Columns<F>>;
-}
-
 /// A material in lanes. Wavelengths are given from the first lane on.
 pub(super) trait BlockBsdf<C: ColorModel> {
     /// [`Bsdf::eval`]; none where all lobes are single directions.
@@ -189,6 +177,18 @@ pub(super) trait BlockBsdf<C: ColorModel> {
         u2: Vec2<F>,
         w: &[C::Wavelengths],
     ) -> BsdfSamples<F, C::Columns<F>>;
+
+    /// Its terms of Phong's equation, if it has a part in it.
+    #[inline(always)]
+    fn phong_lanes<F: Lanes>(
+        &self,
+        _at: &Points<'_, F>,
+        _wi: Vec3<F>,
+        _wo: Vec3<F>,
+        _w: &[C::Wavelengths],
+    ) -> Option<PhongTerms<C::Columns<F>>> {
+        None
+    }
 }
 
 /// The face for single points of a material that is written in lanes.
@@ -256,83 +256,61 @@ pub(super) fn single_sample<C: ColorModel, B: BlockBsdf<C>>(
     })
 }
 
-/// The arguments of [`BlockBsdf::eval_lanes`] of a material.
-struct Eval<'a, C: ColorModel, F: Lanes> {
-    material: &'a Material<C>,
+/// Something to be asked of whichever material it is. `visit` must be `#[inline(always)]`.
+pub(super) trait Visitor<C: ColorModel> {
+    type Output;
+
+    fn visit<B: BlockBsdf<C>>(self, bsdf: &B) -> Self::Output;
+}
+
+/// Asks a material in a function that knows the instructions.
+struct Ask<'a, C: ColorModel, V>(&'a Material<C>, V);
+
+impl<C: ColorModel, F: Lanes, V: Visitor<C>> Call<F> for Ask<'_, C, V> {
+    type Output = V::Output;
+
+    #[inline(always)]
+    fn run(self) -> V::Output {
+        self.0.visit(self.1)
+    }
+}
+
+/// Points, pairs of directions and wavelengths: what [`BlockBsdf::eval_lanes`] is given.
+struct Pairs<'a, C: ColorModel, F: Lanes> {
     at: &'a Points<'a, F>,
     wi: Vec3<F>,
     wo: Vec3<F>,
     w: &'a [C::Wavelengths],
 }
 
-impl<C: ColorModel, F: Lanes> Call<F> for Eval<'_, C, F> {
+/// See [`BlockBsdf::eval_lanes`].
+struct Eval<'a, C: ColorModel, F: Lanes>(Pairs<'a, C, F>);
+
+impl<C: ColorModel, F: Lanes> Visitor<C> for Eval<'_, C, F> {
     type Output = BsdfValues<F, C::Columns<F>>;
 
     #[inline(always)]
-    fn run(self) -> Self::Output {
-        let Self {
-            material,
-            at,
-            wi,
-            wo,
-            w,
-        } = self;
-        match material {
-            Material::BlendBsdf(m) => m.eval_lanes(at, wi, wo, w),
-            Material::BumpMap(m) => m.eval_lanes(at, wi, wo, w),
-            Material::Conductor(m) => m.eval_lanes(at, wi, wo, w),
-            Material::Dielectric(m) => m.eval_lanes(at, wi, wo, w),
-            Material::Diffuse(m) => m.eval_lanes(at, wi, wo, w),
-            Material::Mask(m) => m.eval_lanes(at, wi, wo, w),
-            Material::NormalMap(m) => m.eval_lanes(at, wi, wo, w),
-            Material::Null(m) => BlockBsdf::<C>::eval_lanes(m, at, wi, wo, w),
-            Material::Phong(m) => m.eval_lanes(at, wi, wo, w),
-            Material::Plastic(m) => m.eval_lanes(at, wi, wo, w),
-            Material::Principled(m) => m.eval_lanes(at, wi, wo, w),
-            Material::PrincipledThin(m) => m.eval_lanes(at, wi, wo, w),
-            Material::RoughConductor(m) => m.eval_lanes(at, wi, wo, w),
-            Material::RoughDielectric(m) => m.eval_lanes(at, wi, wo, w),
-            Material::RoughPlastic(m) => m.eval_lanes(at, wi, wo, w),
-            Material::ThinDielectric(m) => m.eval_lanes(at, wi, wo, w),
-            Material::TwoSided(m) => m.eval_lanes(at, wi, wo, w),
-        }
+    fn visit<B: BlockBsdf<C>>(self, bsdf: &B) -> Self::Output {
+        let Pairs { at, wi, wo, w } = self.0;
+        bsdf.eval_lanes(at, wi, wo, w)
     }
 }
 
-/// The same arguments, of [`Material::phong_lanes`].
-struct Terms<'a, C: ColorModel, F: Lanes>(Eval<'a, C, F>);
+/// See [`BlockBsdf::phong_lanes`].
+struct Terms<'a, C: ColorModel, F: Lanes>(Pairs<'a, C, F>);
 
-impl<C: ColorModel, F: Lanes> Call<F> for Terms<'_, C, F> {
-    type Output = PhongTerms<C::Columns<F>>;
+impl<C: ColorModel, F: Lanes> Visitor<C> for Terms<'_, C, F> {
+    type Output = Option<PhongTerms<C::Columns<F>>>;
 
     #[inline(always)]
-    fn run(self) -> Self::Output {
-        let Eval {
-            material,
-            at,
-            wi,
-            wo,
-            w,
-        } = self.0;
-        match material {
-            Material::BlendBsdf(m) => m.phong_lanes(at, wi, wo, w),
-            Material::BumpMap(m) => m.phong_lanes(at, wi, wo, w),
-            Material::Diffuse(m) => m.phong_lanes(at, wi, wo, w),
-            Material::Mask(m) => m.phong_lanes(at, wi, wo, w),
-            Material::NormalMap(m) => m.phong_lanes(at, wi, wo, w),
-            Material::Phong(m) => m.phong_lanes(at, wi, wo, w),
-            Material::TwoSided(m) => m.phong_lanes(at, wi, wo, w),
-            other => PhongTerms {
-                diffuse: Spectra::zero(),
-                specular: other.eval_lanes(at, wi, wo, w).value * F::splat(PI),
-            },
-        }
+    fn visit<B: BlockBsdf<C>>(self, bsdf: &B) -> Self::Output {
+        let Pairs { at, wi, wo, w } = self.0;
+        bsdf.phong_lanes(at, wi, wo, w)
     }
 }
 
-/// The arguments of [`BlockBsdf::sample_lanes`] of a material.
+/// See [`BlockBsdf::sample_lanes`].
 struct Draw<'a, C: ColorModel, F: Lanes> {
-    material: &'a Material<C>,
     at: &'a Points<'a, F>,
     wi: Vec3<F>,
     u1: F,
@@ -340,38 +318,13 @@ struct Draw<'a, C: ColorModel, F: Lanes> {
     w: &'a [C::Wavelengths],
 }
 
-impl<C: ColorModel, F: Lanes> Call<F> for Draw<'_, C, F> {
+impl<C: ColorModel, F: Lanes> Visitor<C> for Draw<'_, C, F> {
     type Output = BsdfSamples<F, C::Columns<F>>;
 
     #[inline(always)]
-    fn run(self) -> Self::Output {
-        let Self {
-            material,
-            at,
-            wi,
-            u1,
-            u2,
-            w,
-        } = self;
-        match material {
-            Material::BlendBsdf(m) => m.sample_lanes(at, wi, u1, u2, w),
-            Material::BumpMap(m) => m.sample_lanes(at, wi, u1, u2, w),
-            Material::Conductor(m) => m.sample_lanes(at, wi, u1, u2, w),
-            Material::Dielectric(m) => m.sample_lanes(at, wi, u1, u2, w),
-            Material::Diffuse(m) => m.sample_lanes(at, wi, u1, u2, w),
-            Material::Mask(m) => m.sample_lanes(at, wi, u1, u2, w),
-            Material::NormalMap(m) => m.sample_lanes(at, wi, u1, u2, w),
-            Material::Null(m) => BlockBsdf::<C>::sample_lanes(m, at, wi, u1, u2, w),
-            Material::Phong(m) => m.sample_lanes(at, wi, u1, u2, w),
-            Material::Plastic(m) => m.sample_lanes(at, wi, u1, u2, w),
-            Material::Principled(m) => m.sample_lanes(at, wi, u1, u2, w),
-            Material::PrincipledThin(m) => m.sample_lanes(at, wi, u1, u2, w),
-            Material::RoughConductor(m) => m.sample_lanes(at, wi, u1, u2, w),
-            Material::RoughDielectric(m) => m.sample_lanes(at, wi, u1, u2, w),
-            Material::RoughPlastic(m) => m.sample_lanes(at, wi, u1, u2, w),
-            Material::ThinDielectric(m) => m.sample_lanes(at, wi, u1, u2, w),
-            Material::TwoSided(m) => m.sample_lanes(at, wi, u1, u2, w),
-        }
+    fn visit<B: BlockBsdf<C>>(self, bsdf: &B) -> Self::Output {
+        let Self { at, wi, u1, u2, w } = self;
+        bsdf.sample_lanes(at, wi, u1, u2, w)
     }
 }
 
@@ -385,13 +338,7 @@ impl<C: ColorModel> Material<C> {
         wo: Vec3<F>,
         w: &[C::Wavelengths],
     ) -> BsdfValues<F, C::Columns<F>> {
-        F::call(Eval {
-            material: self,
-            at,
-            wi,
-            wo,
-            w,
-        })
+        F::call(Ask(self, Eval(Pairs { at, wi, wo, w })))
     }
 
     /// The material's part in Phong's equation. One that has none there gives π times its value, so that a matte one has
@@ -404,13 +351,13 @@ impl<C: ColorModel> Material<C> {
         wo: Vec3<F>,
         w: &[C::Wavelengths],
     ) -> PhongTerms<C::Columns<F>> {
-        F::call(Terms(Eval {
-            material: self,
-            at,
-            wi,
-            wo,
-            w,
-        }))
+        match F::call(Ask(self, Terms(Pairs { at, wi, wo, w }))) {
+            Some(terms) => terms,
+            None => PhongTerms {
+                diffuse: Spectra::zero(),
+                specular: self.eval_lanes(at, wi, wo, w).value * F::splat(PI),
+            },
+        }
     }
 
     /// Draws directions: `u1` chooses the lobe, `u2` the direction.
@@ -423,13 +370,6 @@ impl<C: ColorModel> Material<C> {
         u2: Vec2<F>,
         w: &[C::Wavelengths],
     ) -> BsdfSamples<F, C::Columns<F>> {
-        F::call(Draw {
-            material: self,
-            at,
-            wi,
-            u1,
-            u2,
-            w,
-        })
+        F::call(Ask(self, Draw { at, wi, u1, u2, w }))
     }
 }

@@ -1,6 +1,6 @@
 //! `diffuse`: Lambert's law, f = reflectance / π on the front side; `reflectance` 0.5 by default.
 
-use super::{BlockBsdf, Bsdf, BsdfSamples, BsdfValues, Lobes, PhongBsdf, PhongTerms, single_face};
+use super::{BlockBsdf, Bsdf, BsdfSamples, BsdfValues, Lobes, PhongTerms, single_face};
 use crate::color::{Color, ColorModel, Role, Spectra};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, texture};
@@ -82,6 +82,21 @@ impl<C: ColorModel> BlockBsdf<C> for Diffuse<C> {
             ..samples
         }
     }
+
+    #[inline(always)]
+    fn phong_lanes<F: Lanes>(
+        &self,
+        at: &Points<'_, F>,
+        wi: Vec3<F>,
+        wo: Vec3<F>,
+        w: &[C::Wavelengths],
+    ) -> Option<PhongTerms<C::Columns<F>>> {
+        let terms = PhongTerms {
+            diffuse: self.reflectance.eval_lanes(at, w) * wo.z,
+            specular: Spectra::zero(),
+        };
+        Some(terms.only(F::zero().lt(wi.z) & F::zero().lt(wo.z)))
+    }
 }
 
 impl<C: ColorModel> Bsdf<C> for Diffuse<C> {
@@ -90,21 +105,4 @@ impl<C: ColorModel> Bsdf<C> for Diffuse<C> {
     }
 
     single_face!();
-}
-
-impl<C: ColorModel> PhongBsdf<C> for Diffuse<C> {
-    #[inline(always)]
-    fn phong_lanes<F: Lanes>(
-        &self,
-        at: &Points<'_, F>,
-        wi: Vec3<F>,
-        wo: Vec3<F>,
-        w: &[C::Wavelengths],
-    ) -> PhongTerms<C::Columns<F>> {
-        let terms = PhongTerms {
-            diffuse: self.reflectance.eval_lanes(at, w) * wo.z,
-            specular: Spectra::zero(),
-        };
-        terms.only(F::zero().lt(wi.z) & F::zero().lt(wo.z))
-    }
 }

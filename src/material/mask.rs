@@ -1,8 +1,8 @@
 //! `mask`: the nested material with probability `opacity` (0.5; clamped to [0, 1]), nothing otherwise.
 
 use super::{
-    BlockBsdf, Bsdf, BsdfSamples, BsdfValues, Lobes, Material, PhongBsdf, PhongTerms, fraction,
-    nested, single_face,
+    BlockBsdf, Bsdf, BsdfSamples, BsdfValues, Lobes, Material, PhongTerms, fraction, nested,
+    single_face,
 };
 use crate::color::{ColorModel, Mono, Spectra};
 use crate::description::declared::{Plugin, nested as nested_row, number};
@@ -96,9 +96,7 @@ impl<C: ColorModel> BlockBsdf<C> for Mask<C> {
         };
         BsdfSamples::select(met, nested, passing)
     }
-}
 
-impl<C: ColorModel> PhongBsdf<C> for Mask<C> {
     #[inline(always)]
     fn phong_lanes<F: Lanes>(
         &self,
@@ -106,8 +104,9 @@ impl<C: ColorModel> PhongBsdf<C> for Mask<C> {
         wi: Vec3<F>,
         wo: Vec3<F>,
         w: &[C::Wavelengths],
-    ) -> PhongTerms<C::Columns<F>> {
+    ) -> Option<PhongTerms<C::Columns<F>>> {
         let opacity = self.opacity.numbers(at).clamp(0.0, 1.0);
-        self.nested.phong_lanes(at, wi, wo, w).weighted(opacity)
+        let terms = self.nested.phong_lanes(at, wi, wo, w);
+        Some(terms.weighted(opacity))
     }
 }

@@ -36,7 +36,7 @@ use crate::family::family;
 use crate::interaction::Interaction;
 use crate::texture::{Palettes, Texture};
 
-use block::{BlockBsdf, PhongBsdf, single_face};
+use block::{BlockBsdf, Visitor, single_face};
 pub use block::{BsdfSamples, BsdfValues, PhongTerms};
 
 /// A direction drawn from a BSDF.
@@ -138,7 +138,7 @@ pub trait Bsdf<C: ColorModel>: std::fmt::Debug + Send + Sync {
 family! {
     /// Every material there is.
     #[derive(Clone, Debug)]
-    pub enum Material<C>: Bsdf, context Palettes<C> {
+    pub enum Material<C>: Bsdf, context Palettes<C>, visitor Visitor {
         "blendbsdf" => BlendBsdf(blendbsdf::BlendBsdf<C>),
         "bumpmap" => BumpMap(bumpmap::BumpMap<C>),
         "conductor" => Conductor(conductor::Conductor<C>),

@@ -3,8 +3,7 @@
 //! Stein, *A microfacet-based shadowing function to solve the bump terminator problem*, 2019).
 
 use super::{
-    BlockBsdf, Bsdf, BsdfSamples, BsdfValues, Lobes, Material, PhongBsdf, PhongTerms, nested,
-    single_face,
+    BlockBsdf, Bsdf, BsdfSamples, BsdfValues, Lobes, Material, PhongTerms, nested, single_face,
 };
 use crate::color::ColorModel;
 use crate::description::declared::{Row, boolean, nested as nested_row};
@@ -170,10 +169,8 @@ impl<C: ColorModel, N: Normals> BlockBsdf<C> for Perturbed<C, N> {
             ..samples
         }
     }
-}
 
-/// The terms about the turned normals; the textbook knows no shadowing of bumps.
-impl<C: ColorModel, N: Normals> PhongBsdf<C> for Perturbed<C, N> {
+    /// About the turned normals; the textbook knows no shadowing of bumps.
     #[inline(always)]
     fn phong_lanes<F: Lanes>(
         &self,
@@ -181,11 +178,11 @@ impl<C: ColorModel, N: Normals> PhongBsdf<C> for Perturbed<C, N> {
         wi: Vec3<F>,
         wo: Vec3<F>,
         w: &[C::Wavelengths],
-    ) -> PhongTerms<C::Columns<F>> {
+    ) -> Option<PhongTerms<C::Columns<F>>> {
         let frames = self.frames(at, wi);
         let (inner, inner_wi) = turned(at, &frames, wi);
         let inner_wo = frames.to_local(wo);
         let terms = self.nested.phong_lanes(&inner, inner_wi, inner_wo, w);
-        terms.only(F::zero().lt(inner_wo.z * wo.z))
+        Some(terms.only(F::zero().lt(inner_wo.z * wo.z)))
     }
 }

@@ -10,7 +10,7 @@
 use std::f32::consts::{FRAC_1_PI, TAU};
 
 use super::{
-    BlockBsdf, Bsdf, BsdfSamples, BsdfValues, Lobes, PhongBsdf, PhongTerms, fresnel, mean, samples,
+    BlockBsdf, Bsdf, BsdfSamples, BsdfValues, Lobes, PhongTerms, fresnel, mean, samples,
     single_face,
 };
 use crate::color::{ColorModel, Mono, Role, Spectral};
@@ -151,9 +151,7 @@ impl<C: ColorModel> BlockBsdf<C> for Phong<C> {
         let wo = Vec3::select(u1.lt(F::splat(self.specular_weight)), highlight, base);
         self.eval_lanes(at, wi, wo, w).as_samples(wo, one)
     }
-}
 
-impl<C: ColorModel> PhongBsdf<C> for Phong<C> {
     #[inline(always)]
     fn phong_lanes<F: Lanes>(
         &self,
@@ -161,12 +159,12 @@ impl<C: ColorModel> PhongBsdf<C> for Phong<C> {
         wi: Vec3<F>,
         wo: Vec3<F>,
         w: &[C::Wavelengths],
-    ) -> PhongTerms<C::Columns<F>> {
+    ) -> Option<PhongTerms<C::Columns<F>>> {
         let lobe = lobe(wi, wo, self.exponent(at));
         let terms = PhongTerms {
             diffuse: self.diffuse_reflectance.eval_lanes(at, w) * wo.z,
             specular: self.specular_reflectance.eval_lanes(at, w) * lobe,
         };
-        terms.only(F::zero().lt(wi.z) & F::zero().lt(wo.z))
+        Some(terms.only(F::zero().lt(wi.z) & F::zero().lt(wo.z)))
     }
 }

@@ -1,8 +1,7 @@
 //! `twosided`: lets a one-sided material be seen from both sides; a second nested one covers the back.
 
 use super::{
-    BlockBsdf, Bsdf, BsdfSamples, BsdfValues, Lobes, Material, PhongBsdf, PhongTerms, nested,
-    single_face,
+    BlockBsdf, Bsdf, BsdfSamples, BsdfValues, Lobes, Material, PhongTerms, nested, single_face,
 };
 use crate::color::{ColorModel, Spectra};
 use crate::description::declared::{Plugin, boolean, nested as nested_row};
@@ -131,9 +130,7 @@ impl<C: ColorModel> BlockBsdf<C> for TwoSided<C> {
             ..samples
         }
     }
-}
 
-impl<C: ColorModel> PhongBsdf<C> for TwoSided<C> {
     #[inline(always)]
     fn phong_lanes<F: Lanes>(
         &self,
@@ -141,15 +138,17 @@ impl<C: ColorModel> PhongBsdf<C> for TwoSided<C> {
         wi: Vec3<F>,
         wo: Vec3<F>,
         w: &[C::Wavelengths],
-    ) -> PhongTerms<C::Columns<F>> {
+    ) -> Option<PhongTerms<C::Columns<F>>> {
         let behind = wi.z.lt(F::zero());
         let (wi, wo) = (Self::turned(behind, wi), Self::turned(behind, wo));
         let front = self.front.phong_lanes(at, wi, wo, w);
-        let Some(back) = &self.back else { return front };
+        let Some(back) = &self.back else {
+            return Some(front);
+        };
         let back = back.phong_lanes(at, wi, wo, w);
-        PhongTerms {
+        Some(PhongTerms {
             diffuse: Spectra::select(behind, back.diffuse, front.diffuse),
             specular: Spectra::select(behind, back.specular, front.specular),
-        }
+        })
     }
 }
