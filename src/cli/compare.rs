@@ -273,7 +273,7 @@ impl Arguments {
             label,
             top,
         };
-        image::write_codes(path, &map.draw()?)
+        image::write_codes(path, &map.draw()?, image::Tag::Srgb)
     }
 }
 

@@ -13,7 +13,7 @@ use super::overrides::ImageArguments;
 use super::scene::ReadArguments;
 use super::stop::Stop;
 use super::verdicts::{self, Ending, Style};
-use super::{output, parse, report, status};
+use super::{output, page, parse, report, status};
 
 /// Render scenes here and in Mitsuba, and say whether the images agree
 ///
@@ -80,6 +80,9 @@ pub(super) struct Arguments {
     /// Keep both sides' mean images and a map of the error, in a folder of DIR for each scene
     #[arg(long, value_name = "DIR", conflicts_with = "timing_only")]
     keep: Option<PathBuf>,
+    /// Write DIR/index.html, a page that shows the images side by side, where they differ, and what each side took
+    #[arg(long, value_name = "DIR", conflicts_with = "timing_only")]
+    report: Option<PathBuf>,
     /// Print a JSON object for each scene
     #[arg(long)]
     json: bool,
@@ -93,6 +96,7 @@ Examples:
   etendue crosscheck --install
   etendue crosscheck scenes/*.xml --size 96x96 --spp 64
   etendue crosscheck scene.xml --seeds 16 --precision 0.002 --keep out
+  etendue crosscheck scenes/*.xml --report out && xdg-open out/index.html
   etendue crosscheck scene.xml --variant llvm_ad_rgb --timing-only --json
 
 Exit status: 0 done; all scenes agree; 1 one differs; 2 none differs and one could not be compared or was \
@@ -152,6 +156,7 @@ impl Arguments {
             threads: self.threads.map(|n| n.get() as u32),
             timeout: self.timeout,
             keep: None,
+            pictures: self.report.is_some(),
             timing_only: self.timing_only,
         })
     }
@@ -196,6 +201,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     }
     if endings.len() > 1 {
         verdicts::table(style, &endings);
+    }
+    if let Some(folder) = &arguments.report {
+        let scenes: Vec<_> = endings
+            .iter()
+            .map(|(name, ending)| ending.on_page(name))
+            .collect();
+        page::write(folder, &scenes)?;
     }
     Ok(if stop.signalled() {
         status::INTERRUPTED

@@ -7,6 +7,7 @@
 
 mod check;
 mod compare;
+mod convert;
 mod crosscheck;
 mod info;
 mod mesh;
@@ -17,14 +18,17 @@ mod render;
 
 mod available;
 mod batch;
+mod display;
 mod growth;
 mod memory;
 mod output;
 mod overrides;
+mod page;
 mod parse;
 mod progress;
 mod report;
 mod scene;
+mod staging;
 mod status;
 mod stop;
 mod summary;
@@ -49,6 +53,7 @@ enum Command {
     Render(Box<render::Arguments>),
     Check(check::Arguments),
     Compare(Box<compare::Arguments>),
+    Convert(convert::Arguments),
     Crosscheck(Box<crosscheck::Arguments>),
     Info(info::Arguments),
     Mesh(mesh::Arguments),
@@ -70,6 +75,7 @@ pub(crate) fn run() -> ExitCode {
         Command::Render(arguments) => render::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
+        Command::Convert(arguments) => convert::run(&arguments),
         Command::Crosscheck(arguments) => crosscheck::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
         Command::Mesh(arguments) => mesh::run(&arguments),

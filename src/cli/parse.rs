@@ -53,6 +53,13 @@ pub(super) fn crop(text: &str) -> Parsed<Window> {
     })
 }
 
+/// A part of the whole, from 0 to 1.
+pub(super) fn part(text: &str) -> Parsed<f32> {
+    let part: Option<f32> = text.parse().ok();
+    part.filter(|part| (0.0..=1.0).contains(part))
+        .ok_or_else(|| "write a number from 0 to 1".to_owned())
+}
+
 /// `1,-2,0.5`
 pub(super) fn point(text: &str) -> Parsed<DVec3> {
     let numbers: Option<Vec<f64>> = text.split(',').map(|t| t.trim().parse().ok()).collect();

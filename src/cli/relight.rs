@@ -9,6 +9,7 @@ use etendue::image::{self, Metadata};
 use etendue::relight::{self, Weight};
 use serde_json::{Value, json};
 
+use super::display::DisplayArguments;
 use super::memory::MemoryArguments;
 use super::{output, parse, status};
 
@@ -32,6 +33,8 @@ pub(super) struct Arguments {
     #[arg(long)]
     json: bool,
     #[command(flatten)]
+    display: DisplayArguments,
+    #[command(flatten)]
     memory: MemoryArguments,
 }
 
@@ -49,7 +52,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         if !weights.is_empty() {
             metadata = metadata.with("weights", weights.join(" "));
         }
-        display::save(output, &relit, &metadata)?;
+        display::save(output, &relit, &metadata, &arguments.display.transform())?;
     }
     let layers = relight::layers(&image);
     if layers.is_empty() {

@@ -17,11 +17,13 @@ use etendue::render::{
 use glam::DVec3;
 
 use super::batch::{Batch, Item, Request};
+use super::display::DisplayArguments;
 use super::memory::{RUN, RunArguments};
 use super::overrides::{IMAGE, ImageArguments};
 use super::parse::{self, Frames};
 use super::progress::Bar;
 use super::scene::SceneArguments;
+use super::staging::StagingArguments;
 use super::stop::Stop;
 use super::summary::{self, Ending, Style};
 use super::turntable::{self, Orbit};
@@ -50,6 +52,10 @@ pub(super) struct Arguments {
 
     #[command(flatten)]
     image: ImageArguments,
+    #[command(flatten)]
+    display: DisplayArguments,
+    #[command(flatten)]
+    staging: StagingArguments,
     /// Seed of the random numbers: one seed, one image
     #[arg(long, default_value_t = 0, value_name = "N", help_heading = IMAGE)]
     seed: u64,
@@ -132,7 +138,10 @@ Examples:
   etendue render room.xml -o room.exr --noise-threshold 0.01 --sampler sobol
   etendue render big.xml -o big.exr --checkpoint 300 --resume
   etendue render terrain.ply -o terrain.png --cache ~/.cache/etendue
-  etendue render dragon.ply -o dragon.png --stats --heatmap steps.png";
+  etendue render dragon.ply -o dragon.png --stats --heatmap steps.png
+  etendue render room.xml -o room.png --exposure auto --view agx
+  etendue render part.stl -o part.png --material metal --azimuth -60 --background transparent
+  etendue render scan.ply -o scan.png --light sun --write-scene scan.xml";
 
 /// How rays find shapes.
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -411,7 +420,7 @@ impl Series<'_> {
             label: "node steps a sample",
             top: robust_top(&heat.node_steps),
         };
-        image::write_codes(path, &map.draw()?)
+        image::write_codes(path, &map.draw()?, image::Tag::Srgb)
     }
 
     /// The description of an item, with the arguments' values in place of its own.
@@ -427,7 +436,14 @@ impl Series<'_> {
             return Ok((options, description));
         }
         let (budget, session) = (&self.budget, &mut self.session);
-        let mut description = scene.describe(&item.input, &options, budget, session)?;
+        let turns = self.arguments.turntable.is_some();
+        let (arguments, up) = (&self.arguments.staging, scene.up_axis());
+        let staging = arguments.staging(up, self.arguments.image.size(), turns);
+        let (mut description, text) =
+            scene.describe_staged(&item.input, &staging, &options, budget, session)?;
+        if let (Some(path), Some(text)) = (&arguments.write_scene, text) {
+            etendue::file::write_atomically(path, text.as_bytes())?;
+        }
         self.arguments.image.overrides().apply(&mut description);
         Ok((options, description))
     }
@@ -452,7 +468,8 @@ impl Series<'_> {
             report,
             ..
         } = rendered;
-        display::save_window(&item.output, &image, &window, &metadata)?;
+        let display = self.arguments.display.transform();
+        display::save_window(&item.output, &image, &window, &metadata, &display)?;
         if completed.is_whole() {
             if let Some(checkpoint) = &options.checkpoint {
                 checkpoint.remove();

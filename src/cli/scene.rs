@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use etendue::budget::Budget;
 use etendue::description::{Description, Options};
 use etendue::error::{Error, Result};
-use etendue::render::{self, BareMesh, Session, UpAxis};
+use etendue::render::{self, BareMesh, Session, Staging, UpAxis};
 
 use super::output::with_frame;
 use super::parse;
@@ -82,15 +82,35 @@ impl SceneArguments {
         budget: &Budget,
         session: &mut Session,
     ) -> Result<Description> {
+        let staging = Staging {
+            up: self.up_axis(),
+            ..Staging::default()
+        };
+        let (description, _) = self.describe_staged(input, &staging, options, budget, session)?;
+        Ok(description)
+    }
+
+    /// The same with a bare mesh shown as asked for, whose scene is told as text.
+    pub(super) fn describe_staged(
+        &self,
+        input: &Path,
+        staging: &Staging,
+        options: &Options,
+        budget: &Budget,
+        session: &mut Session,
+    ) -> Result<(Description, Option<String>)> {
         self.check(input)?;
         if render::is_mesh(input) {
             render::check_mesh(input, budget.limit())?;
-            let BareMesh { description, mesh } =
-                render::describe_mesh(input, self.up_axis(), options, budget)?;
+            let BareMesh {
+                description,
+                text,
+                mesh,
+            } = render::describe_mesh(input, staging, options, budget)?;
             session.give(mesh);
-            return Ok(description);
+            return Ok((description, Some(text)));
         }
-        Description::read(input, options, budget)
+        Ok((Description::read(input, options, budget)?, None))
     }
 
     /// Refuses what is neither a scene nor a mesh by its name.

@@ -5,6 +5,7 @@ use etendue::compare::seeds::{PlacesTest, Verdict};
 use etendue::crosscheck::{Cost, Crosscheck, Failure};
 use serde_json::{Value, json};
 
+use super::page::Scene;
 use super::{output, status};
 
 /// How much is told, and what counts as agreement.
@@ -71,6 +72,30 @@ impl Ending {
         Self {
             kind: Kind::of(&result, style.precision),
             result,
+        }
+    }
+
+    /// The scene as a page shows it.
+    pub(super) fn on_page<'a>(&'a self, name: &'a str) -> Scene<'a> {
+        let status = self.kind.name();
+        match &self.result {
+            Err(failure) => Scene {
+                name,
+                status,
+                lines: vec![("why".to_owned(), failure.to_string())],
+                pictures: None,
+            },
+            Ok(crosscheck) => {
+                let lines = lines(crosscheck).into_iter();
+                Scene {
+                    name,
+                    status,
+                    lines: lines
+                        .map(|(label, text)| (label.to_owned(), text))
+                        .collect(),
+                    pictures: crosscheck.pictures.as_ref(),
+                }
+            }
         }
     }
 

@@ -26,6 +26,20 @@ impl Primaries {
         blue: [0.15, 0.06],
         white: [0.3127, 0.329],
     };
+    /// P3 with white D65 (SMPTE EG 432-1, 2010).
+    pub const P3_D65: Self = Self {
+        red: [0.68, 0.32],
+        green: [0.265, 0.69],
+        blue: [0.15, 0.06],
+        white: [0.3127, 0.329],
+    };
+    /// ITU-R BT.2020.
+    pub const BT2020: Self = Self {
+        red: [0.708, 0.292],
+        green: [0.17, 0.797],
+        blue: [0.131, 0.046],
+        white: [0.3127, 0.329],
+    };
     /// CIE XYZ as if it were RGB.
     pub const XYZ: Self = Self {
         red: [1.0, 0.0],
@@ -46,7 +60,7 @@ impl Primaries {
     }
 
     /// What takes this RGB to XYZ; `None` where three such primaries make no space of colours.
-    fn to_xyz(self) -> Option<DMat3> {
+    pub fn to_xyz(self) -> Option<DMat3> {
         // Of no luminance yet: the sums X + Y + Z are 1.
         let column = |[x, y]: [f64; 2]| DVec3::new(x, y, 1.0 - x - y);
         let shape = DMat3::from_cols(column(self.red), column(self.green), column(self.blue));
@@ -82,12 +96,7 @@ impl Primaries {
 mod tests {
     use super::*;
 
-    const BT2020: Primaries = Primaries {
-        red: [0.708, 0.292],
-        green: [0.17, 0.797],
-        blue: [0.131, 0.046],
-        white: [0.3127, 0.329],
-    };
+    const BT2020: Primaries = Primaries::BT2020;
 
     #[test]
     fn colours_of_other_primaries_become_those_of_bt709() {

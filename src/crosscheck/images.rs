@@ -8,7 +8,6 @@ use crate::budget::Budget;
 use crate::compare::map::{Map, robust_top};
 use crate::compare::seeds::{self, Verdict};
 use crate::compare::{Layer, Selection};
-use crate::display;
 use crate::error::Error;
 use crate::image::{self, Image, Metadata};
 
@@ -23,6 +22,17 @@ pub(super) fn read(path: &Path) -> Result<Layer, Failure> {
 
 fn not_comparable(error: Error) -> Failure {
     Failure::NotComparable(error.to_string())
+}
+
+/// What both sides have made.
+#[derive(Clone, Debug)]
+pub struct Pictures {
+    /// The mean over Mitsuba's seeds.
+    pub reference: Image,
+    /// The mean over Étendue's.
+    pub ours: Image,
+    /// How many standard errors a pixel's two means are apart, row by row.
+    pub standard_errors: Vec<f32>,
 }
 
 /// The images of both sides so far; the reference comes first.
@@ -72,7 +82,7 @@ impl Images {
     pub(super) fn keep(&self, folder: &Path) -> Result<(), Failure> {
         for (mean, name) in self.means.iter().zip(["mitsuba.exr", "etendue.exr"]) {
             if let Some(image) = &mean.image {
-                display::save(&folder.join(name), image, &Metadata::default())?;
+                image::write(&folder.join(name), image, &Metadata::default())?;
             }
         }
         let [reference, ours] = self.sides()?;
@@ -83,8 +93,21 @@ impl Images {
             label: "standard errors apart",
             top: robust_top(&values),
         };
-        image::write_codes(&folder.join("error.png"), &map.draw()?)?;
+        image::write_codes(&folder.join("error.png"), &map.draw()?, image::Tag::Srgb)?;
         Ok(())
+    }
+
+    /// The mean images, and how far they are apart.
+    pub(super) fn pictures(self) -> Result<Pictures, Failure> {
+        let [reference, ours] = self.sides()?;
+        let standard_errors = seeds::map(reference, ours)?;
+        let [reference, ours] = self.means.map(|mean| mean.image);
+        let none = || Failure::Broken("there are no images".to_owned());
+        Ok(Pictures {
+            reference: reference.ok_or_else(none)?,
+            ours: ours.ok_or_else(none)?,
+            standard_errors,
+        })
     }
 
     fn sides(&self) -> Result<&[seeds::Side; 2], Failure> {

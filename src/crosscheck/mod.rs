@@ -20,6 +20,7 @@ use serde::Serialize;
 use crate::render::Overrides;
 
 pub use cost::{Cost, Time};
+pub use images::Pictures;
 pub use python::{Python, VARIABLE, find_python, home, install};
 pub use run::{Crosscheck, crosscheck};
 pub use serve::serve;
@@ -77,6 +78,8 @@ pub struct Settings {
     pub timeout: Duration,
     /// Where the mean images of both sides and a map of the error are kept.
     pub keep: Option<PathBuf>,
+    /// Whether [`Crosscheck::pictures`] are wanted.
+    pub pictures: bool,
     /// Whether images are not judged, only timed.
     pub timing_only: bool,
 }

@@ -9,7 +9,7 @@ use std::time::Instant;
 use serde::Serialize;
 
 use super::cost::{self, Cost};
-use super::images::{self, Images};
+use super::images::{self, Images, Pictures};
 use super::order::{Order, Reply};
 use super::process::Worker;
 use super::{Failure, Settings, Side, Watch};
@@ -49,6 +49,9 @@ const PLUGINS: [(&str, &str); 3] = [
 pub struct Crosscheck {
     /// Whether the images agree; absent where only times were asked for.
     pub verdict: Option<Verdict>,
+    /// What was made, where it was asked for.
+    #[serde(skip)]
+    pub pictures: Option<Pictures>,
     /// Samples a pixel and seed.
     pub spp: u32,
     /// Renders a side.
@@ -149,9 +152,11 @@ pub fn crosscheck(
     let notes = notes(&sides);
     let spp = sides[0].spp;
     let [etendue, mitsuba] = sides.map(Runner::finish);
+    let judged = !settings.timing_only;
     Ok(Crosscheck {
-        verdict: (!settings.timing_only)
-            .then(|| images.judge())
+        verdict: judged.then(|| images.judge()).transpose()?,
+        pictures: (judged && settings.pictures)
+            .then(|| images.pictures())
             .transpose()?,
         spp,
         seeds: settings.seeds,

@@ -8,9 +8,8 @@ use super::cost::Clock;
 use super::order::{Loaded, Order, Rendered, Reply};
 use crate::budget::Budget;
 use crate::description::{self, Description, Kind, NodeId, Properties, Value};
-use crate::display;
 use crate::error::{Error, Result};
-use crate::image::Metadata;
+use crate::image::{self, Metadata};
 use crate::render::{Colors, Options, Session, Silent, find_sensor};
 
 /// Answers the order and the seeds on `input` until it ends.
@@ -131,7 +130,7 @@ impl Scene {
         let rendered = self.session.render(&self.description, &options, &Silent)?;
         let time = clock.time();
         let image = self.order.folder.join(format!("etendue-{seed}.exr"));
-        display::save(&image, &rendered.image, &Metadata::default())?;
+        image::write(&image, &rendered.image, &Metadata::default())?;
         let spp = rendered.report.spp;
         Ok(Rendered { image, spp, time })
     }

@@ -1,88 +1,312 @@
-//! From scene-referred to display-referred: linear values become codes for a screen, and [`save`] is how
-//! renders leave: EXR and HDR stay linear, PNG is encoded.
+//! From scene-referred to display-referred. A [`DisplayTransform`] makes linear values into codes for a screen: exposure,
+//! a view (how more light than a display has is compressed), glare, the display's primaries, its curve, and as many bits
+//! as it has. [`save`] is how renders leave: EXR, HDR and PFM stay linear, PNG is encoded.
 
 pub mod srgb;
 
-use std::borrow::Cow;
+mod aces;
+mod agx;
+mod blur;
+mod dither;
+mod exposure;
+mod glare;
+mod local;
+mod sigmoid;
+mod transfer;
+
 use std::path::Path;
 
-use crate::color::xyz_to_rgb;
-use crate::error::Result;
-use crate::image::{self, Format, Image, Metadata, Window};
+use glam::{DMat3, DVec3};
+use rayon::prelude::*;
 
-/// Writes an image in linear BT.709 or XYZ in the format of the extension: `.exr` (every channel, metadata), `.hdr`
-/// (main colour) or `.png` (main colour and opacity, encoded by [`srgb::encode`]). The file appears whole
-/// or not at all.
-///
-/// # Errors
-/// Where the extension is another, the format cannot hold the image, or the file system refuses.
-pub fn save(path: &Path, image: &Image, metadata: &Metadata) -> Result<()> {
-    match Format::of_output(path)? {
-        Format::Png => image::write_codes(path, &srgb::encode(&in_rgb(image))?),
-        Format::Hdr => image::write(path, &in_rgb(image), metadata),
-        Format::Exr => image::write(path, image, metadata),
+use crate::color::Primaries;
+use crate::error::{Error, Result};
+use crate::image::{self, Code, Codes, Format, Image, Layout, Metadata, Tag, Window};
+
+pub use exposure::Exposure;
+pub use transfer::{Transfer, WHITE_NITS};
+
+/// How light beyond the display's range is brought into it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum View {
+    /// Not at all: what is above 1 is cut off.
+    #[default]
+    Standard,
+    /// By a sigmoid about the geometric mean of luminance.
+    Sigmoid,
+    /// By the luminance of each place's neighbourhood.
+    Local,
+    /// AgX.
+    Agx,
+    /// ACES 1.
+    Aces,
+}
+
+/// A display's primaries; white is D65.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Gamut {
+    /// ITU-R BT.709, as sRGB has them.
+    #[default]
+    Bt709,
+    /// P3.
+    P3,
+    /// ITU-R BT.2020.
+    Bt2020,
+}
+
+/// Bits of a code.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Depth {
+    /// 256 codes.
+    #[default]
+    Eight,
+    /// 65,536 codes.
+    Sixteen,
+}
+
+/// What lies between linear values and codes. By default exactly sRGB in 8 bits.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DisplayTransform {
+    /// A factor before all else.
+    pub exposure: Exposure,
+    /// How the range is compressed.
+    pub view: View,
+    /// How much of the light beyond the display's maximum is spread over its neighbourhood; from 0 to 1.
+    pub glare: f32,
+    /// The display's primaries.
+    pub gamut: Gamut,
+    /// Its curve.
+    pub transfer: Transfer,
+    /// Bits of a code.
+    pub depth: Depth,
+    /// Whether what lies between two codes becomes either by a pattern of blue noise, so that no bands are seen.
+    pub dither: bool,
+}
+
+impl Default for DisplayTransform {
+    fn default() -> Self {
+        Self {
+            exposure: Exposure::Stops(0.0),
+            view: View::Standard,
+            glare: 0.0,
+            gamut: Gamut::Bt709,
+            transfer: Transfer::Srgb,
+            depth: Depth::Eight,
+            dither: false,
+        }
     }
 }
 
-/// The image with R, G, B in place of X, Y, Z.
-fn in_rgb(image: &Image) -> Cow<'_, Image> {
-    let [Some(x), Some(y), Some(z)] = ["X", "Y", "Z"].map(|name| image.channel(name)) else {
-        return Cow::Borrowed(image);
-    };
-    let mut names = image.channels().to_vec();
-    for (place, name) in [(x, "R"), (y, "G"), (z, "B")] {
-        names[place] = name.to_owned();
-    }
-    let mut data = image.data().to_vec();
-    for pixel in data.chunks_exact_mut(names.len()) {
-        let rgb = xyz_to_rgb([x, y, z].map(|place| f64::from(pixel[place])));
-        for (place, value) in [x, y, z].into_iter().zip(rgb) {
-            pixel[place] = value as f32;
+/// Pixels that one task encodes.
+const GRAIN: usize = 1 << 13;
+
+impl DisplayTransform {
+    /// Writes the codes of an image's main colour, and of its straight opacity if it has a channel A, as PNG or JPEG.
+    ///
+    /// # Errors
+    /// Where the image has neither R, G, B nor X, Y, Z nor Y, or no pixels; where the file system refuses.
+    pub fn write(&self, path: &Path, image: &Image) -> Result<()> {
+        match self.depth {
+            Depth::Eight => image::write_codes(path, &self.codes::<u8>(image)?, self.tag()),
+            Depth::Sixteen => image::write_codes(path, &self.codes::<u16>(image)?, self.tag()),
         }
     }
-    let image = Image::from_data(image.width(), image.height(), names, data);
-    Cow::Owned(image.expect("as many samples as before"))
+
+    /// The 8-bit codes of an image's main colour and opacity.
+    ///
+    /// # Errors
+    /// As [`DisplayTransform::write`].
+    pub fn shown(&self, image: &Image) -> Result<Codes> {
+        self.codes(image)
+    }
+
+    /// The codes of an image's main colour and opacity, of as many bits as `T` has.
+    fn codes<T: Quantised>(&self, image: &Image) -> Result<Codes<T>> {
+        let image = &*image.in_rgb();
+        let Some(rgb) = image.rgb() else {
+            return Err(Error::input("a display image needs channels R, G, B or Y")
+                .help("write EXR, which takes any channels"));
+        };
+        let alpha = image.alpha();
+        let layout = match (rgb[0] == rgb[1], alpha) {
+            (true, None) => Layout::Grey,
+            (true, Some(_)) => Layout::GreyAlpha,
+            (false, None) => Layout::Rgb,
+            (false, Some(_)) => Layout::Rgba,
+        };
+        let stride = image.channels().len();
+        let colour = |pixel: &[f32]| rgb.map(|c| pixel[c]);
+        let mut pixels: Vec<[f32; 3]> = image.data().chunks_exact(stride).map(colour).collect();
+        let width = image.width() as usize;
+        self.show(&mut pixels, width);
+        let channels = layout.channels();
+        let colours = channels - usize::from(alpha.is_some());
+        let mut codes = vec![T::default(); pixels.len() * channels];
+        let coded = codes.par_chunks_exact_mut(channels).enumerate();
+        let sources = pixels.par_iter().zip(image.data().par_chunks_exact(stride));
+        (coded.zip(sources).with_min_len(GRAIN)).for_each(|((i, codes), (shown, source))| {
+            let (x, y) = (i % width, i / width);
+            for (c, code) in codes[..colours].iter_mut().enumerate() {
+                *code = self.code(shown[c], [x, y], c);
+            }
+            if let Some(a) = alpha {
+                codes[colours] = T::of(source[a].clamp(0.0, 1.0), 0.5);
+            }
+        });
+        Codes::new(image.width(), image.height(), layout, codes)
+    }
+
+    /// From scene-referred linear BT.709 to light of the display's primaries, of which 1 is white.
+    fn show(&self, pixels: &mut [[f32; 3]], width: usize) {
+        let exposure = self.exposure.factor(pixels);
+        match self.view {
+            View::Sigmoid => sigmoid::view(pixels, exposure),
+            View::Local => local::view(pixels, width, exposure),
+            View::Standard | View::Agx | View::Aces if exposure != 1.0 => {
+                for pixel in &mut *pixels {
+                    *pixel = pixel.map(|v| v * exposure);
+                }
+            }
+            View::Standard | View::Agx | View::Aces => {}
+        }
+        match self.view {
+            View::Agx => each(pixels, agx::view),
+            View::Aces => {
+                let aces = aces::Aces::new();
+                each(pixels, |rgb| aces.view(rgb));
+            }
+            View::Standard | View::Sigmoid | View::Local => {}
+        }
+        if self.glare > 0.0 && !pixels.is_empty() {
+            glare::add(pixels, width, self.glare);
+        }
+        if let Some(matrix) = self.gamut.matrix() {
+            each(pixels, |rgb| {
+                (matrix * DVec3::from(rgb.map(f64::from))).as_vec3().into()
+            });
+        }
+    }
+
+    /// The code of a shown value.
+    fn code<T: Quantised>(&self, shown: f32, [x, y]: [usize; 2], channel: usize) -> T {
+        if self.dither {
+            return T::of(
+                self.transfer.encode(shown),
+                dither::threshold(x, y, channel),
+            );
+        }
+        match (self.transfer, T::SRGB) {
+            (Transfer::Srgb, Some(encode)) => encode(shown),
+            _ => T::of(self.transfer.encode(shown), 0.5),
+        }
+    }
+
+    /// What the codes mean.
+    fn tag(&self) -> Tag {
+        let primaries = match self.gamut {
+            Gamut::Bt709 => 1,
+            Gamut::P3 => 12,
+            Gamut::Bt2020 => 9,
+        };
+        match (self.transfer, self.gamut) {
+            (Transfer::Srgb, Gamut::Bt709) => Tag::Srgb,
+            (Transfer::Gamma(exponent), _) => Tag::Gamma(exponent),
+            (Transfer::Srgb, _) => Tag::Cicp {
+                primaries,
+                transfer: 13,
+            },
+            (Transfer::Pq, _) => Tag::Cicp {
+                primaries,
+                transfer: 16,
+            },
+            (Transfer::Hlg, _) => Tag::Cicp {
+                primaries,
+                transfer: 18,
+            },
+        }
+    }
+}
+
+/// Changes every pixel by itself.
+fn each(pixels: &mut [[f32; 3]], view: impl Fn([f32; 3]) -> [f32; 3] + Sync) {
+    let pixels = pixels.par_iter_mut().with_min_len(GRAIN);
+    pixels.for_each(|pixel| *pixel = view(*pixel));
+}
+
+impl Gamut {
+    /// From linear BT.709, unless it is that.
+    fn matrix(self) -> Option<DMat3> {
+        let primaries = match self {
+            Self::Bt709 => return None,
+            Self::P3 => Primaries::P3_D65,
+            Self::Bt2020 => Primaries::BT2020,
+        };
+        let to_xyz = |primaries: Primaries| primaries.to_xyz().expect("they are a space");
+        Some(to_xyz(primaries).inverse() * to_xyz(Primaries::BT709))
+    }
+}
+
+/// A code that a value in [0, 1] is brought to.
+trait Quantised: Code + Default + Send {
+    /// What encodes linear values as sRGB at once, where there is such a thing.
+    const SRGB: Option<fn(f32) -> Self>;
+    /// The next code below where the rest is less than 1 − `threshold`, else the next one above.
+    fn of(value: f32, threshold: f32) -> Self;
+}
+
+impl Quantised for u8 {
+    const SRGB: Option<fn(f32) -> Self> = Some(srgb::encode_value);
+
+    fn of(value: f32, threshold: f32) -> Self {
+        (value * 255.0 + threshold) as u8
+    }
+}
+
+impl Quantised for u16 {
+    const SRGB: Option<fn(f32) -> Self> = None;
+
+    fn of(value: f32, threshold: f32) -> Self {
+        (value * 65535.0 + threshold) as u16
+    }
+}
+
+/// Writes an image in linear BT.709 or XYZ in the format of the extension: `.exr` (every channel, metadata), `.hdr` or
+/// `.pfm` (main colour), `.png` or `.jpg` (main colour, PNG with opacity, as `display` makes them into codes). The file
+/// appears whole or not at all.
+///
+/// # Errors
+/// Where the extension is another, the format cannot hold the image, or the file system refuses.
+pub fn save(
+    path: &Path,
+    image: &Image,
+    metadata: &Metadata,
+    display: &DisplayTransform,
+) -> Result<()> {
+    match Format::of_output(path)? {
+        Format::Png | Format::Jpeg => display.write(path, image),
+        Format::Hdr | Format::Pfm => image::write(path, &image.in_rgb(), metadata),
+        Format::Exr => image::write(path, image, metadata),
+    }
 }
 
 /// Like [`save`], for an image that is a part of a whole: EXR says which, the others only store the part.
 ///
 /// # Errors
 /// As [`save`], and where the image reaches beyond the whole.
-pub fn save_window(path: &Path, image: &Image, window: &Window, metadata: &Metadata) -> Result<()> {
+pub fn save_window(
+    path: &Path,
+    image: &Image,
+    window: &Window,
+    metadata: &Metadata,
+    display: &DisplayTransform,
+) -> Result<()> {
     match Format::of_output(path)? {
-        Format::Png | Format::Hdr => save(path, image, metadata),
+        Format::Png | Format::Jpeg | Format::Hdr | Format::Pfm => {
+            save(path, image, metadata, display)
+        }
         Format::Exr => image::write_window(path, image, window, metadata),
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::budget::Budget;
-    use crate::image::Encoding;
-
-    #[test]
-    fn one_image_leaves_in_every_format_linear_or_encoded() {
-        let folder = tempfile::tempdir().unwrap();
-        let names = ["R", "G", "B"].map(String::from).to_vec();
-        let image = Image::from_data(2, 1, names, vec![0.5, 0.0, 1.0, 2.0, 0.25, 0.125]).unwrap();
-        for (name, encoding, red) in [
-            ("a.exr", Encoding::Linear, 0.5),
-            ("a.HDR", Encoding::Linear, 0.5),
-            ("a.png", Encoding::Srgb, 188.0 / 255.0),
-        ] {
-            let path = folder.path().join(name);
-            save(&path, &image, &Metadata::default()).unwrap();
-            let back = image::read(&path, &Budget::default().open()).unwrap();
-            assert_eq!(back.encoding, encoding, "{name}");
-            assert_eq!(back.image.get(0, 0, 0), red, "{name}");
-        }
-    }
-
-    #[test]
-    fn an_unknown_extension_names_the_known_ones() {
-        let image = Image::new(1, 1, vec!["Y".into()]);
-        let error = save(Path::new("a.tiff"), &image, &Metadata::default()).unwrap_err();
-        assert!(error.to_string().contains(".exr, .hdr or .png"), "{error}");
-    }
-}
+mod tests;

@@ -1,16 +1,10 @@
 //! 8-bit sRGB: code = round(255 · curve(x)) of linear BT.709 values clamped to [0, 1], with the curve of
-//! [`crate::color::srgb`]. NaN becomes 0. Opacity has no curve.
+//! [`crate::color::srgb`]. NaN becomes 0.
 
 use std::sync::LazyLock;
 
-use rayon::prelude::*;
-
 use crate::color::srgb;
-use crate::error::{Error, Result};
-use crate::image::{Codes, Image, Layout};
-
-/// Pixels that one task encodes.
-const GRAIN: usize = 1 << 13;
+use crate::image::{Encoding, Image, Picture};
 
 /// The 8-bit code of linear light `x`, the nearest one.
 pub fn encode_value(x: f32) -> u8 {
@@ -27,48 +21,19 @@ pub fn decode_value(code: u8) -> f32 {
     srgb::decode_table()[usize::from(code)]
 }
 
-/// The codes of an image's main colour, and of its straight opacity if it has a channel A.
-///
-/// # Errors
-/// Where the image has neither R, G, B nor X, Y, Z nor Y, or no pixels.
-pub fn encode(image: &Image) -> Result<Codes> {
-    let image = &*image.in_rgb();
-    let Some(rgb) = image.rgb() else {
-        return Err(Error::input("a display image needs channels R, G, B or Y")
-            .help("write EXR, which takes any channels"));
-    };
-    let alpha = image.alpha();
-    let grey = rgb[0] == rgb[1];
-    let layout = match (grey, alpha) {
-        (true, None) => Layout::Grey,
-        (true, Some(_)) => Layout::GreyAlpha,
-        (false, None) => Layout::Rgb,
-        (false, Some(_)) => Layout::Rgba,
-    };
-    let colour = if grey { &rgb[..1] } else { &rgb[..] };
-    let pixels = image.width() as usize * image.height() as usize;
-    let mut codes = vec![0; pixels * layout.channels()];
-    let coded = codes.par_chunks_exact_mut(layout.channels());
-    let pixels = image.data().par_chunks_exact(image.channels().len());
-    (coded.zip(pixels).with_min_len(GRAIN)).for_each(|(codes, pixel)| {
-        for (code, &c) in codes.iter_mut().zip(colour) {
-            *code = encode_value(pixel[c]);
+/// An image's linear values: codes of a file are decoded, but for opacity, which has no curve.
+pub fn linear(picture: Picture) -> Image {
+    let mut image = picture.image;
+    if picture.encoding == Encoding::Srgb {
+        let alpha = image.alpha();
+        let channels = image.channels().len();
+        for (i, value) in image.data_mut().iter_mut().enumerate() {
+            if Some(i % channels) != alpha {
+                *value = srgb::decode(*value);
+            }
         }
-        if let (Some(a), Some(code)) = (alpha, codes.last_mut()) {
-            *code = quantise(clamp(pixel[a]));
-        }
-    });
-    Codes::new(image.width(), image.height(), layout, codes)
-}
-
-/// Into [0, 1]; NaN becomes 0.
-fn clamp(x: f32) -> f32 {
-    if x > 0.0 { x.min(1.0) } else { 0.0 }
-}
-
-/// The nearest of 256 codes to `x` in [0, 1].
-fn quantise(x: f32) -> u8 {
-    (x * 255.0).round() as u8
+    }
+    image
 }
 
 #[cfg(test)]
@@ -96,22 +61,5 @@ mod tests {
             assert_eq!(encode_value(border * 0.9999), code);
             assert_eq!(encode_value(border * 1.0001), code + 1);
         }
-    }
-
-    #[test]
-    fn channels_decide_the_layout_and_opacity_has_no_curve() {
-        for (names, layout, codes) in [
-            (&["Y"][..], Layout::Grey, &[188][..]),
-            (&["Y", "A"], Layout::GreyAlpha, &[188, 128]),
-            (&["B", "G", "R"], Layout::Rgb, &[188, 188, 188]),
-            (&["A", "B", "G", "R"], Layout::Rgba, &[188, 188, 188, 128]),
-        ] {
-            let names: Vec<String> = names.iter().map(ToString::to_string).collect();
-            let data = vec![0.5; names.len()];
-            let encoded = encode(&Image::from_data(1, 1, names, data).unwrap()).unwrap();
-            assert_eq!(encoded.layout(), layout);
-            assert_eq!(encoded.data(), codes);
-        }
-        assert!(encode(&Image::new(1, 1, vec!["depth".into()])).is_err());
     }
 }

@@ -1,16 +1,18 @@
-//! Images of 8-bit codes, and their file format, PNG. What the codes mean is not known here: the display
-//! layer makes them.
+//! Images of codes of 8 or 16 bits, and their file formats, PNG and JPEG. The display layer makes them, and says by a [`Tag`] what
+//! they mean.
 
+use std::borrow::Cow;
 use std::path::Path;
 
 use ::image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use ::image::{ExtendedColorType, ImageEncoder};
+use libjpeg_turbo_rs::{Encoder, PixelFormat, Subsampling};
 
 use crate::error::{Error, Result};
 use crate::file;
 use crate::image::format::Format;
 
-/// The channels of an 8-bit image.
+/// The channels of an image of codes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Layout {
     /// Grey.
@@ -35,21 +37,90 @@ impl Layout {
     }
 }
 
-/// An image of 8-bit codes, interleaved, the top row first.
+/// What codes mean, for those who show them (PNG, third edition, 2025: sRGB, gAMA and cICP).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Tag {
+    /// The colour space sRGB.
+    Srgb,
+    /// Primaries of BT.709, and codes that are light to the power of the inverse of this.
+    Gamma(f32),
+    /// Primaries and transfer characteristics by their numbers in ITU-T H.273.
+    Cicp {
+        /// Such as 1 for BT.709, 9 for BT.2020, 12 for P3 with white D65.
+        primaries: u8,
+        /// Such as 13 for sRGB, 16 for PQ, 18 for HLG.
+        transfer: u8,
+    },
+}
+
+impl Tag {
+    /// The chunk's name and data.
+    fn chunk(self) -> (&'static [u8; 4], Vec<u8>) {
+        match self {
+            // As rendered colours mostly are meant: perceptually.
+            Self::Srgb => (b"sRGB", vec![0]),
+            Self::Gamma(exponent) => {
+                let part = (100_000.0 / exponent).round() as u32;
+                (b"gAMA", part.to_be_bytes().to_vec())
+            }
+            // RGB, of full range.
+            Self::Cicp {
+                primaries,
+                transfer,
+            } => (b"cICP", vec![primaries, transfer, 0, 1]),
+        }
+    }
+}
+
+/// A code's type: `u8` or `u16`.
+pub trait Code: Copy {
+    /// What the crate `image` calls pixels of these, by layout.
+    const COLORS: [ExtendedColorType; 4];
+    /// The memory's bytes.
+    fn bytes(codes: &[Self]) -> Cow<'_, [u8]>;
+}
+
+impl Code for u8 {
+    const COLORS: [ExtendedColorType; 4] = [
+        ExtendedColorType::L8,
+        ExtendedColorType::La8,
+        ExtendedColorType::Rgb8,
+        ExtendedColorType::Rgba8,
+    ];
+
+    fn bytes(codes: &[u8]) -> Cow<'_, [u8]> {
+        Cow::Borrowed(codes)
+    }
+}
+
+impl Code for u16 {
+    const COLORS: [ExtendedColorType; 4] = [
+        ExtendedColorType::L16,
+        ExtendedColorType::La16,
+        ExtendedColorType::Rgb16,
+        ExtendedColorType::Rgba16,
+    ];
+
+    fn bytes(codes: &[u16]) -> Cow<'_, [u8]> {
+        codes.iter().flat_map(|code| code.to_ne_bytes()).collect()
+    }
+}
+
+/// An image of codes, interleaved, the top row first.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Codes {
+pub struct Codes<T = u8> {
     width: u32,
     height: u32,
     layout: Layout,
-    data: Vec<u8>,
+    data: Vec<T>,
 }
 
-impl Codes {
+impl<T: Code> Codes<T> {
     /// An image of the given codes.
     ///
     /// # Errors
     /// Unless there are exactly as many codes as width, height and layout ask for.
-    pub fn new(width: u32, height: u32, layout: Layout, data: Vec<u8>) -> Result<Self> {
+    pub fn new(width: u32, height: u32, layout: Layout, data: Vec<T>) -> Result<Self> {
         let wanted = u128::from(width) * u128::from(height) * layout.channels() as u128;
         if wanted != data.len() as u128 || data.is_empty() {
             return Err(Error::input(format!(
@@ -81,38 +152,82 @@ impl Codes {
     }
 
     /// The codes, interleaved.
-    pub fn data(&self) -> &[u8] {
+    pub fn data(&self) -> &[T] {
         &self.data
     }
 
     /// The bytes of a PNG file.
-    fn to_png(&self) -> Result<Vec<u8>> {
-        let color = match self.layout {
-            Layout::Grey => ExtendedColorType::L8,
-            Layout::GreyAlpha => ExtendedColorType::La8,
-            Layout::Rgb => ExtendedColorType::Rgb8,
-            Layout::Rgba => ExtendedColorType::Rgba8,
-        };
+    fn to_png(&self, tag: Tag) -> Result<Vec<u8>> {
         let mut bytes = Vec::new();
         // Noise hardly gets smaller by more work.
         PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Adaptive)
-            .write_image(&self.data, self.width, self.height, color)
+            .write_image(
+                &T::bytes(&self.data),
+                self.width,
+                self.height,
+                T::COLORS[self.layout as usize],
+            )
             .map_err(|e| Error::input(format!("the image cannot be stored as PNG: {e}")))?;
+        // It stands behind the header, which every file begins with: a signature of 8 bytes, and a chunk of 25.
+        let chunk = chunk(tag);
+        bytes.splice(33..33, chunk);
         Ok(bytes)
+    }
+
+    /// The bytes of a JPEG file of the colours, with all their detail: JPEG has no opacity.
+    ///
+    /// # Errors
+    /// Where codes have 16 bits.
+    pub fn to_jpeg(&self) -> Result<Vec<u8>> {
+        const QUALITY: u8 = 95;
+        if size_of::<T>() != 1 {
+            return Err(Error::input("JPEG has 8 bits a channel").help("use .png for 16"));
+        }
+        let (format, colours) = match self.layout {
+            Layout::Grey | Layout::GreyAlpha => (PixelFormat::Grayscale, 1),
+            Layout::Rgb | Layout::Rgba => (PixelFormat::Rgb, 3),
+        };
+        let all = T::bytes(&self.data);
+        let pixels = all.chunks_exact(self.layout.channels());
+        let kept: Vec<u8> = pixels
+            .flat_map(|pixel| &pixel[..colours])
+            .copied()
+            .collect();
+        Encoder::new(&kept, self.width as usize, self.height as usize, format)
+            .quality(QUALITY)
+            .subsampling(Subsampling::S444)
+            .encode()
+            .map_err(|e| Error::input(format!("the image cannot be stored as JPEG: {e}")))
     }
 }
 
-/// Writes 8-bit codes as a PNG file, whole or not at all.
+/// A chunk of a PNG file: length, name, data and a check of the last two.
+fn chunk(tag: Tag) -> Vec<u8> {
+    let (name, data) = tag.chunk();
+    let checked = [&name[..], &data].concat();
+    let check = crc32fast::hash(&checked);
+    let length = data.len() as u32;
+    [&length.to_be_bytes()[..], &checked, &check.to_be_bytes()].concat()
+}
+
+/// Writes codes as a PNG or a JPEG file, whole or not at all. JPEG is always taken for sRGB.
 ///
 /// # Errors
-/// Where the extension is not `.png` or the file system refuses.
-pub fn write_codes(path: &Path, codes: &Codes) -> Result<()> {
-    if Format::of_output(path)? != Format::Png {
-        return Err(Error::input(format!(
-            "8-bit codes cannot be stored as {}",
-            path.display()
-        ))
-        .help("use .png"));
-    }
-    file::write_atomically(path, &codes.to_png()?)
+/// Where the extension is another or the format cannot hold the codes, or the file system refuses.
+pub fn write_codes<T: Code>(path: &Path, codes: &Codes<T>, tag: Tag) -> Result<()> {
+    let bytes = match Format::of_output(path)? {
+        Format::Png => codes.to_png(tag)?,
+        Format::Jpeg if tag == Tag::Srgb => codes.to_jpeg()?,
+        Format::Jpeg => {
+            let error = Error::input("a JPEG file cannot say that its codes are no sRGB");
+            return Err(error.help("use .png"));
+        }
+        Format::Exr | Format::Hdr | Format::Pfm => {
+            let path = path.display();
+            return Err(
+                Error::input(format!("codes cannot be stored as {path}")).help("use .png or .jpg")
+            );
+        }
+    };
+    file::write_atomically(path, &bytes)
 }

@@ -15,20 +15,26 @@ pub enum Format {
     Exr,
     /// Radiance RGBE.
     Hdr,
-    /// PNG, 8 bits a channel.
+    /// Portable float map.
+    Pfm,
+    /// PNG, 8 or 16 bits a channel.
     Png,
+    /// JPEG, 8 bits a channel.
+    Jpeg,
 }
 
 impl Format {
     /// The format that the extension of `path` asks for.
     ///
     /// # Errors
-    /// For any extension but `.exr`, `.hdr` and `.png`, in whatever case.
+    /// For any extension but `.exr`, `.hdr`, `.pfm`, `.png`, `.jpg` and `.jpeg`, in whatever case.
     pub fn of_output(path: &Path) -> Result<Self> {
         match extension(path).as_str() {
             "exr" => Ok(Self::Exr),
             "hdr" => Ok(Self::Hdr),
+            "pfm" => Ok(Self::Pfm),
             "png" => Ok(Self::Png),
+            "jpg" | "jpeg" => Ok(Self::Jpeg),
             other => {
                 let name = path.display();
                 let message = if other.is_empty() {
@@ -36,7 +42,7 @@ impl Format {
                 } else {
                     format!("the image name {name} has the unknown extension .{other}")
                 };
-                Err(Error::input(message).help("use .exr, .hdr or .png"))
+                Err(Error::input(message).help("use .exr, .hdr, .pfm, .png or .jpg"))
             }
         }
     }

@@ -1,12 +1,13 @@
 //! Images: a strided buffer of named f32 channels with views, and files in and out. Reading takes EXR,
 //! HDR, PFM, PNG, JPEG, BMP, TGA and PPM and gives values as the file holds them, but for colours that a file says
-//! to be of other primaries, which become those of BT.709; writing takes linear values as EXR or HDR and ready codes
-//! as PNG. Which curve lies between the two is the display layer's business.
+//! to be of other primaries, which become those of BT.709; writing takes linear values as EXR, HDR or PFM and ready
+//! codes as PNG or JPEG. Which curve lies between the two is the display layer's business.
 
 mod buffer;
 mod codes;
 mod format;
 mod jpeg;
+mod layers;
 mod metadata;
 mod openexr;
 mod pfm;
@@ -21,8 +22,9 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
 pub use buffer::Image;
-pub use codes::{Codes, Layout, write_codes};
+pub use codes::{Code, Codes, Layout, Tag, write_codes};
 pub use format::Format;
+pub use layers::sheet;
 pub use metadata::{MetaValue, Metadata, Window};
 pub use openexr::check_channels;
 pub use view::View;
@@ -114,7 +116,7 @@ fn decode_by(decoder: Decoder, bytes: &[u8], account: &Account) -> Result<Pictur
     }
 }
 
-/// Writes linear values as EXR (all channels, metadata) or HDR (main colour), by the extension. The file
+/// Writes linear values as EXR (all channels, metadata), HDR or PFM (main colour), by the extension. The file
 /// appears whole or not at all.
 ///
 /// # Errors
@@ -129,7 +131,7 @@ pub fn write(path: &Path, image: &Image, metadata: &Metadata) -> Result<()> {
     write_window(path, image, &whole, metadata)
 }
 
-/// Like [`write()`], for an image that is a part of a whole: EXR says which, HDR only stores the part.
+/// Like [`write()`], for an image that is a part of a whole: EXR says which, the others only store the part.
 ///
 /// # Errors
 /// As [`write()`], and where the image reaches beyond the whole.
@@ -142,7 +144,8 @@ pub fn write_window(
     let bytes = match Format::of_output(path)? {
         Format::Exr => openexr::encode(image, window, metadata)?,
         Format::Hdr => radiance::encode(image)?,
-        Format::Png => {
+        Format::Pfm => pfm::encode(image)?,
+        Format::Png | Format::Jpeg => {
             return Err(Error::input(format!(
                 "linear values cannot be stored as {}",
                 path.display()

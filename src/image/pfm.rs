@@ -40,6 +40,27 @@ impl<'a> Header<'a> {
     }
 }
 
+/// The bytes of a PFM file with an image's main colour.
+pub(super) fn encode(image: &Image) -> Result<Vec<u8>> {
+    let Some(rgb) = image.rgb() else {
+        return Err(Error::input("a PFM image needs channels R, G, B or Y")
+            .help("write EXR, which takes any channels"));
+    };
+    let (mark, colour) = match rgb {
+        [r, g, _] if r == g => ("Pf", &rgb[..1]),
+        _ => ("PF", &rgb[..]),
+    };
+    let (width, height) = (image.width(), image.height());
+    let mut bytes = format!("{mark}\n{width} {height}\n-1.0\n").into_bytes();
+    for y in (0..height).rev() {
+        for x in 0..width {
+            let pixel = image.pixel(x, y);
+            bytes.extend(colour.iter().flat_map(|c| pixel[*c].to_le_bytes()));
+        }
+    }
+    Ok(bytes)
+}
+
 /// Decodes the bytes of a PFM file.
 pub(super) fn decode(bytes: &[u8], account: &Account) -> Result<Picture> {
     let names: &[&str] = if bytes.starts_with(b"PF") {

@@ -35,7 +35,7 @@ use crate::image::{Image, Metadata, Window};
 use crate::integrator::Stats;
 
 pub use adaptive::AdaptiveReport;
-pub use bare::{BareMesh, UpAxis, describe_mesh, is_mesh};
+pub use bare::{Background, BareMesh, Finish, Lighting, Staging, UpAxis, describe_mesh, is_mesh};
 pub use heat::Heat;
 pub use info::{NamedFile, SceneInfo, SensorInfo};
 pub use memory::check_mesh;

@@ -421,7 +421,7 @@ fn a_bare_mesh_is_in_the_middle_of_its_turntable() {
     let place = Place::new();
     let path = place.path("floor.ply");
     let options = description::Options::default();
-    let bare = describe_mesh(&path, UpAxis::Y, &options, &Budget::default()).unwrap();
+    let bare = describe_mesh(&path, &Staging::default(), &options, &Budget::default()).unwrap();
     let bounds = Session::default()
         .bounds(&bare.description, &Options::default(), &Silent)
         .unwrap();
@@ -477,7 +477,10 @@ fn a_flat_bare_mesh_is_seen_whichever_way_it_lies() {
             fs::write(&path, red_square(corner, first, second)).unwrap();
             let bare = describe_mesh(
                 &path,
-                up,
+                &Staging {
+                    up,
+                    ..Staging::default()
+                },
                 &description::Options::default(),
                 &Budget::default(),
             )
@@ -510,7 +513,7 @@ fn a_bare_mesh_without_an_area_is_refused_in_words() {
             fs::write(&path, red_square(Vec3::ONE, first, second)).unwrap();
             let refused = describe_mesh(
                 &path,
-                UpAxis::Y,
+                &Staging::default(),
                 &description::Options::default(),
                 &Budget::default(),
             );
@@ -529,12 +532,14 @@ fn a_mesh_that_is_given_is_not_read_again() {
     let path = place.path("floor.ply");
     let bare = describe_mesh(
         &path,
-        UpAxis::Y,
+        &Staging::default(),
         &description::Options::default(),
         &Budget::default(),
     )
     .unwrap();
-    let BareMesh { description, mesh } = bare;
+    let BareMesh {
+        description, mesh, ..
+    } = bare;
     fs::write(&path, "nothing of use").unwrap();
     let mut session = Session::default();
     let mut bounds = |mesh: Option<_>| {

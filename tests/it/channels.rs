@@ -194,7 +194,13 @@ fn every_pixel_format_has_its_channels() {
     let folder = tempfile::tempdir().unwrap();
     let picture = |name: &str| {
         let path = folder.path().join(format!("{name}.png"));
-        etendue::display::save(&path, &format(name), &Default::default()).unwrap();
+        etendue::display::save(
+            &path,
+            &format(name),
+            &Default::default(),
+            &Default::default(),
+        )
+        .unwrap();
         etendue::image::read(&path, &Default::default())
             .unwrap()
             .image

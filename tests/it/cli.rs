@@ -106,6 +106,7 @@ fn help_reads_as_it_was_blessed() {
         ("check", &["check", "--help"]),
         ("compare", &["compare", "--help"]),
         ("info", &["info", "--help"]),
+        ("convert", &["convert", "--help"]),
         ("relight", &["relight", "--help"]),
         ("crosscheck", &["crosscheck", "--help"]),
         ("mesh", &["mesh", "--help"]),
@@ -358,6 +359,79 @@ fn info_counts_what_scenes_meshes_and_images_hold() {
         "    R: greatest ",
     ] {
         assert!(lines.contains(line), "{line:?}: {lines}");
+    }
+}
+
+#[test]
+fn convert_makes_the_pictures_that_render_makes_and_takes_layers_crops_and_sheets() {
+    let place = Place::new();
+    for view in [
+        "",
+        "--view agx --exposure 1.5 --dither",
+        "--encode pq --gamut bt2020 --bits 16",
+    ] {
+        place
+            .run(format!("render scene.xml -o direct.png {view}").trim())
+            .ends_with(0);
+        place.run("render scene.xml -o a.exr").ends_with(0);
+        place
+            .run(format!("convert a.exr -o converted.png {view}").trim())
+            .ends_with(0);
+        let bytes = |name: &str| fs::read(place.path(name)).unwrap();
+        assert!(bytes("direct.png") == bytes("converted.png"), "{view}");
+    }
+    let read = |name: &str| {
+        etendue::image::read(&place.path(name), &Default::default())
+            .unwrap()
+            .image
+    };
+    // Codes survive a way through linear values; floats survive every linear format.
+    place.run("convert a.exr -o b.png").ends_with(0);
+    place.run("convert b.png -o c.exr").ends_with(0);
+    place.run("convert c.exr -o d.png").ends_with(0);
+    assert_eq!(read("b.png"), read("d.png"));
+    place.run("convert a.exr -o e.pfm").ends_with(0);
+    assert_eq!(read("e.pfm").pixel(3, 2), &read("a.exr").pixel(3, 2)[..3]);
+
+    let (width, height) = (read("a.exr").width(), read("a.exr").height());
+    let run = place.run("convert a.exr b.png -o pair.png --sheet 2 --json");
+    let object = &run.ends_with(0).objects()[0];
+    assert_eq!(object["width"], 2 * width + 4);
+    assert_eq!(object["height"], height);
+    place
+        .run("convert a.exr -o crop.exr --crop 1,2,3,4")
+        .ends_with(0);
+    assert_eq!(read("crop.exr").pixel(0, 0), read("a.exr").pixel(1, 2));
+    place
+        .run("convert a.exr b.png -o out-{name}.jpg")
+        .ends_with(0);
+    assert_eq!(read("out-b.jpg").width(), width);
+
+    for (arguments, status, message) in [
+        (
+            "convert a.exr -o x.png --layer albedo",
+            1,
+            "no layer \"albedo\"",
+        ),
+        (
+            "convert a.exr -o x.png --crop 0,0,9999,1",
+            1,
+            "does not lie within",
+        ),
+        ("convert a.exr b.png -o x.png", 1, "would both be written"),
+        ("convert a.exr -o x.gif", 1, "unknown extension .gif"),
+        ("convert none.exr -o x.png", 3, "none.exr"),
+        ("convert a.exr -o x.jpg --bits 16", 1, "JPEG has 8 bits"),
+        ("convert a.exr -o x.jpg --encode pq", 1, "no sRGB"),
+        ("convert a.exr -o x.png --encode gama:2", 2, "gamma:2.2"),
+        ("convert a.exr -o x.png --glare 2", 2, "from 0 to 1"),
+    ] {
+        let run = place.run(arguments);
+        assert!(
+            run.ends_with(status).stderr().contains(message),
+            "{arguments}: {}",
+            run.stderr()
+        );
     }
 }
 

@@ -347,7 +347,8 @@ fn a_bitmap_stands_upright_with_its_first_texel_at_the_origin_of_uv() {
     let image = Image::from_data(3, 2, names, TEXELS.concat()).expect("the sizes agree");
     for (name, tolerance) in [("t.exr", 1e-6), ("t.png", 4e-3)] {
         let path = folder.path().join(name);
-        display::save(&path, &image, &Metadata::default()).expect("the folder is there");
+        display::save(&path, &image, &Metadata::default(), &Default::default())
+            .expect("the folder is there");
         let texture = format!(
             r#"<texture type="bitmap" name="radiance">
                 <string name="filename" value="{}"/><string name="filter_type" value="nearest"/>

@@ -326,7 +326,13 @@ impl Place {
     }
 
     fn save(&self, name: &str, image: &Image) {
-        display::save(&self.path(name), image, &Metadata::default()).unwrap();
+        display::save(
+            &self.path(name),
+            image,
+            &Metadata::default(),
+            &Default::default(),
+        )
+        .unwrap();
     }
 
     fn run(&self, arguments: &str) -> Output {

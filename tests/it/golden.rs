@@ -41,7 +41,13 @@ fn render_small(scene: &Path, path: &Path) {
     let rendered =
         render(&description, &Options::default(), &Silent).unwrap_or_else(|e| panic!("{e}"));
     assert!(rendered.warnings.is_empty(), "{:?}", rendered.warnings);
-    display::save(path, &rendered.image, &Metadata::default()).unwrap_or_else(|e| panic!("{e}"));
+    display::save(
+        path,
+        &rendered.image,
+        &Metadata::default(),
+        &Default::default(),
+    )
+    .unwrap_or_else(|e| panic!("{e}"));
 }
 
 fn read(path: &Path) -> Image {
@@ -100,7 +106,13 @@ fn every_scene_looks_as_it_did() {
         }
         if let Some((message, difference)) = judge(&read(&golden), &read(&actual)) {
             let path = target.join(format!("{name}-difference.png"));
-            display::save(&path, &difference, &Metadata::default()).expect("target is there");
+            display::save(
+                &path,
+                &difference,
+                &Metadata::default(),
+                &Default::default(),
+            )
+            .expect("target is there");
             let (actual, path) = (actual.display(), path.display());
             failures.push(format!("{name}: {message}\n  {actual}\n  {path}"));
         }

@@ -512,9 +512,14 @@ const CASES: &[Case<'static>] = &[
         "an unknown extension",
         "-o image.tiff",
         1,
-        &[".exr, .hdr or .png"],
+        &[".exr, .hdr, .pfm, .png or .jpg"],
     ),
-    usage("no extension", "-o image", 1, &[".exr, .hdr or .png"]),
+    usage(
+        "no extension",
+        "-o image",
+        1,
+        &[".exr, .hdr, .pfm, .png or .jpg"],
+    ),
     usage(
         "an input that is not there",
         "nowhere.xml -o {name}.png",

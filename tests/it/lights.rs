@@ -159,7 +159,8 @@ fn light_drawn_toward_the_lamp_toward_the_material_and_both_is_the_same() {
         }
     }
     let file = folder.path().join("spot.exr");
-    display::save(&file, &spot, &Metadata::default()).expect("the folder is there");
+    display::save(&file, &spot, &Metadata::default(), &Default::default())
+        .expect("the folder is there");
     let radiances = [
         r#"<rgb name="radiance" value="5"/>"#.to_owned(),
         format!(

@@ -250,12 +250,42 @@ fn png_codes_come_back_unchanged() {
         let data: Vec<u8> = (0..n).map(|i| (i % 256) as u8).collect();
         let codes = Codes::new(16, 16, layout, data.clone()).unwrap();
         let back = in_file("a.png", |path| {
-            write_codes(path, &codes).unwrap();
+            write_codes(path, &codes, Tag::Srgb).unwrap();
             read(path, &Budget::default().open()).unwrap()
         });
         assert_eq!(back.encoding, Encoding::Srgb);
         let values: Vec<f32> = data.iter().map(|&v| f32::from(v) / 255.0).collect();
         assert_eq!(back.image.data(), values, "{layout:?}");
+
+        let data: Vec<u16> = (0..n).map(|i| (i * 257 % 65_536) as u16).collect();
+        let codes = Codes::new(16, 16, layout, data.clone()).unwrap();
+        let back = in_file("a.png", |path| {
+            write_codes(path, &codes, Tag::Gamma(2.2)).unwrap();
+            read(path, &Budget::default().open()).unwrap()
+        });
+        let values: Vec<f32> = data.iter().map(|&v| f32::from(v) / 65535.0).collect();
+        assert_eq!(back.image.data(), values, "{layout:?}");
+    }
+}
+
+/// By the format's text: a length, four letters, data and a CRC-32 of letters and data, before the pixels.
+#[test]
+fn png_files_say_what_their_codes_mean() {
+    let codes = Codes::new(1, 1, Layout::Grey, vec![7_u8]).unwrap();
+    let cicp = Tag::Cicp {
+        primaries: 9,
+        transfer: 16,
+    };
+    for (tag, expected) in [
+        (Tag::Srgb, &b"\0\0\0\x01sRGB\0\xae\xce\x1c\xe9"[..]),
+        (Tag::Gamma(2.2), b"\0\0\0\x04gAMA\0\0\xb1\x8f"),
+        (cicp, b"\0\0\0\x04cICP\x09\x10\0\x01"),
+    ] {
+        let bytes = in_file("a.png", |path| {
+            write_codes(path, &codes, tag).unwrap();
+            std::fs::read(path).unwrap()
+        });
+        assert_eq!(&bytes[33..][..expected.len()], expected, "{tag:?}");
     }
 }
 
@@ -304,7 +334,7 @@ fn what_cannot_be_written_is_known_before_the_render() {
     let folder = tempfile::tempdir().unwrap();
     for (name, message) in [
         ("a", "has no extension"),
-        ("a.tiff", "use .exr, .hdr or .png"),
+        ("a.tiff", "use .exr, .hdr, .pfm, .png or .jpg"),
     ] {
         let path = folder.path().join(name);
         let error = check_writable(&path).unwrap_err();

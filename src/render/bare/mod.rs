@@ -2,6 +2,9 @@
 //! and a key light, in the colours of its vertices, faces or materials where the file has any. The ground is a little
 //! lower than the mesh, so that what is flat does not lie in it.
 
+mod frame;
+mod staging;
+
 use std::path::Path;
 
 use glam::{DMat4, DVec3, Vec3};
@@ -10,29 +13,13 @@ use crate::budget::Budget;
 use crate::description::{Description, Options};
 use crate::error::{Error, Location, Result};
 use crate::mesh::{
-    Attribute, BARE_COLOR, GltfCamera, Mesh, MeshFile, Projection, ReadMesh, ReadOptions,
-    extension, read, read_gltf_camera,
+    Attribute, GltfCamera, Mesh, MeshFile, Projection, ReadMesh, ReadOptions, extension, read,
+    read_gltf_camera,
 };
+use frame::FOV;
+use staging::{point, quoted};
 
-/// Which way is up in a mesh file.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum UpAxis {
-    /// +y, as most scanned and modelled meshes have it.
-    #[default]
-    Y,
-    /// +z, as CAD and terrain have it.
-    Z,
-}
-
-impl UpAxis {
-    /// Of unit length.
-    pub fn direction(self) -> Vec3 {
-        match self {
-            Self::Y => Vec3::Y,
-            Self::Z => Vec3::Z,
-        }
-    }
-}
+pub use staging::{Background, Finish, Lighting, Staging, UpAxis};
 
 /// Whether the file's extension is a mesh's.
 pub fn is_mesh(path: &Path) -> bool {
@@ -55,9 +42,6 @@ fn plugin(path: &Path) -> Option<&'static str> {
         .find_map(|(e, plugin)| (*e == extension).then_some(*plugin))
 }
 
-/// The camera's vertical field of view in degrees.
-const FOV: f32 = 30.0;
-
 /// How far below the mesh the ground is, as a part of the mesh's radius.
 const GROUND_GAP: f32 = 1e-3;
 
@@ -66,6 +50,8 @@ const GROUND_GAP: f32 = 1e-3;
 pub struct BareMesh {
     /// The scene. Its parameters can be overridden as any scene's.
     pub description: Description,
+    /// The same as a file, which other programs read too where they know the mesh's format.
+    pub text: String,
     /// The mesh: give it to the [`Session`](super::Session), and it is not read again.
     pub mesh: ReadMesh,
 }
@@ -73,7 +59,7 @@ pub struct BareMesh {
 /// A scene around the mesh in `path`, which is read within the budget.
 pub fn describe_mesh(
     path: &Path,
-    up: UpAxis,
+    staging: &Staging,
     options: &Options,
     budget: &Budget,
 ) -> Result<BareMesh> {
@@ -99,19 +85,32 @@ pub fn describe_mesh(
         let warning = Error::input(message).at(&Location::of_file(path));
         loaded.warnings.extend_from_slice(warning.problems());
     }
-    let up = up.direction();
     let camera = match plugin {
-        "gltf" => read_gltf_camera(path, budget)?,
+        "gltf" if !staging.asks_for_camera() => read_gltf_camera(path, budget)?,
         _ => None,
     };
-    let text = scene(&Subject {
+    let subject = Subject {
         plugin,
-        path,
         bounds,
-        up,
         camera: camera.and_then(|camera| own_camera(&camera)),
         mesh: &loaded.mesh,
-    });
+        staging,
+    };
+    let text = scene(
+        &subject,
+        Path::new(path.file_name().unwrap_or_default()),
+        true,
+    );
+    let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    // Only these formats' materials are colours.
+    let colored = matches!(plugin, "obj" | "gltf");
+    let bare = colored
+        && loaded
+            .mesh
+            .attributes
+            .iter()
+            .any(|a| a.name == "face_color");
+    let written = scene(&subject, &absolute, bare);
     // What is written here is nobody's to be refused.
     let options = Options {
         strict: false,
@@ -123,17 +122,20 @@ pub fn describe_mesh(
         options: read_options,
     };
     let mesh = ReadMesh { file, loaded };
-    Ok(BareMesh { description, mesh })
+    Ok(BareMesh {
+        description,
+        text: written,
+        mesh,
+    })
 }
 
 /// What the scene shows.
 struct Subject<'a> {
     plugin: &'static str,
-    path: &'a Path,
     bounds: (Vec3, Vec3),
-    up: Vec3,
     camera: Option<OwnCamera>,
     mesh: &'a Mesh,
+    staging: &'a Staging,
 }
 
 /// A camera that comes with the file.
@@ -188,110 +190,104 @@ fn unseen(mesh: &Mesh) -> Vec<String> {
     unseen
 }
 
-/// The mesh's reflectance: its own colours, or that of clay.
-fn reflectance(mesh: &Mesh) -> String {
-    match colors(mesh).next() {
-        Some(attribute) => format!(
-            r#"<texture name="reflectance" type="mesh_attribute"><string name="name" value="{}"/></texture>"#,
-            attribute.name
-        ),
-        None => {
-            let [r, g, b] = BARE_COLOR;
-            format!(r#"<rgb name="reflectance" value="{r}, {g}, {b}"/>"#)
-        }
-    }
+/// The mesh's own colours as a texture of this name.
+fn color(mesh: &Mesh, name: &str) -> Option<String> {
+    let attribute = &colors(mesh).next()?.name;
+    Some(format!(
+        r#"<texture name="{name}" type="mesh_attribute"><string name="name" value="{attribute}"/></texture>"#
+    ))
 }
 
-fn scene(subject: &Subject<'_>) -> String {
+/// The scene around the mesh that the shape reads from `file`, `bare` with its materials' colours.
+fn scene(subject: &Subject<'_>, file: &Path, bare: bool) -> String {
     let Subject {
         plugin,
-        path,
         bounds: (min, max),
-        up,
+        mesh,
+        staging,
         ..
     } = *subject;
-    let center = 0.5 * (min + max);
-    let radius = (0.5 * (max - min).length()).max(f32::MIN_POSITIVE);
-    // From the front, a little to the right and above: right-handed with `up`.
-    let (right, front) = if up == Vec3::Y {
-        (Vec3::X, Vec3::Z)
-    } else {
-        (Vec3::X, Vec3::NEG_Y)
-    };
-    let view = (0.45 * right + 0.9 * front + 0.35 * up).normalize();
-    let distance = radius / (FOV.to_radians() / 2.0).sin();
-    let eye = center + distance * view;
-    let key = center + 4.0 * radius * (-0.9 * right + 0.7 * front + 1.2 * up).normalize();
-    let ground = center + up * ((min - center).dot(up) - GROUND_GAP * radius);
-    let [near, far] = [distance * 1e-3, distance * 100.0];
-    let point = |p: Vec3| format!("{}, {}, {}", p.x, p.y, p.z);
-    let file = path.file_name().unwrap_or_default().to_string_lossy();
-    let file = file
-        .replace('&', "&amp;")
-        .replace('"', "&quot;")
-        .replace('<', "&lt;")
-        .replace('$', "&#36;");
+    let (center, radius) = frame::ball(min, max);
+    let up = staging.up.direction();
+    let pose = frame::pose(mesh, (min, max), staging);
+    let distance = pose.eye.distance(pose.target);
+    let [near, far] = [distance * 1e-3, (distance + f64::from(radius)) * 100.0];
     let (fov, fov_axis, to_world) = match &subject.camera {
         Some(OwnCamera { to_world, fov_y }) => {
             let rows = to_world.transpose().to_cols_array().map(|v| v.to_string());
-            (
-                *fov_y,
-                "y",
-                format!(r#"<matrix value="{}"/>"#, rows.join(" ")),
-            )
+            let matrix = format!(r#"<matrix value="{}"/>"#, rows.join(" "));
+            (*fov_y, "y", matrix)
         }
-        None => (
-            f64::from(FOV),
-            "smaller",
-            format!(
-                r#"<lookat origin="{}" target="{}" up="{}"/>"#,
-                point(eye),
-                point(center),
-                point(up)
-            ),
-        ),
+        None => {
+            let [eye, target, upright] =
+                [pose.eye, pose.target, pose.up].map(|p| format!("{}, {}, {}", p.x, p.y, p.z));
+            let lookat = format!(r#"<lookat origin="{eye}" target="{target}" up="{upright}"/>"#);
+            (staging.fov.unwrap_or(FOV).into(), "smaller", lookat)
+        }
     };
+    let hidden = match staging.background {
+        Background::Transparent => r#"<boolean name="hide_emitters" value="true"/>"#,
+        Background::Sky | Background::Color(_) => "",
+    };
+    let pixels = match staging.background {
+        Background::Transparent => r#"<string name="pixel_format" value="rgba"/>"#,
+        Background::Sky | Background::Color(_) => "",
+    };
+    let key = (-0.9 * pose.right + 0.7 * pose.front + 1.2 * up).normalize();
     format!(
         r#"<scene version="3.0.0">
-    <integrator type="path"><integer name="max_depth" value="8"/></integrator>
+    <integrator type="path"><integer name="max_depth" value="8"/>{hidden}</integrator>
     <sensor type="perspective">
         <float name="fov" value="{fov}"/>
         <string name="fov_axis" value="{fov_axis}"/>
         <float name="near_clip" value="{near}"/>
         <float name="far_clip" value="{far}"/>
         <transform name="to_world">{to_world}</transform>
-        <film type="hdrfilm"><integer name="width" value="1024"/><integer name="height" value="768"/></film>
+        <film type="hdrfilm"><integer name="width" value="1024"/><integer name="height" value="768"/>{pixels}</film>
         <sampler type="stratified"><integer name="sample_count" value="64"/></sampler>
     </sensor>
-    <emitter type="constant"><rgb name="radiance" value="0.42, 0.47, 0.55"/></emitter>
-    <shape type="sphere">
-        <point name="center" value="{key}"/>
-        <float name="radius" value="{key_radius}"/>
-        <emitter type="area"><rgb name="radiance" value="30, 27, 23"/></emitter>
-    </shape>
-    <shape type="rectangle">
-        <transform name="to_world">
-            <scale value="{ground_size}"/>
-            <lookat origin="{ground}" target="{ground_up}" up="{front}"/>
-        </transform>
-        <bsdf type="twosided"><bsdf type="diffuse"><rgb name="reflectance" value="0.35, 0.35, 0.36"/></bsdf></bsdf>
-    </shape>
+    {lights}{ground}
     <shape type="{plugin}">
         <string name="filename" value="{file}"/>
-        <boolean name="face_normals" value="{flat}"/>
-        <boolean name="bare" value="true"/>
-        <bsdf type="twosided"><bsdf type="diffuse">{reflectance}</bsdf></bsdf>
+        <boolean name="face_normals" value="{flat}"/>{bare}
+        {material}
     </shape>
 </scene>"#,
-        key = point(key),
-        key_radius = 0.6 * radius,
-        ground_size = 40.0 * radius,
-        ground = point(ground),
-        ground_up = point(ground + radius * up),
-        front = point(front),
+        lights = staging.lights(center, radius, key),
+        ground = if staging.has_ground() {
+            ground(center, min, radius, staging.up)
+        } else {
+            String::new()
+        },
+        file = quoted(&file.to_string_lossy()),
         // A glTF without normals is meant to be flat; other formats leave them to be computed.
-        flat = plugin == "gltf" && subject.mesh.normals.is_empty(),
-        reflectance = reflectance(subject.mesh),
+        flat = plugin == "gltf" && mesh.normals.is_empty(),
+        bare = if bare {
+            "\n        <boolean name=\"bare\" value=\"true\"/>"
+        } else {
+            ""
+        },
+        material = staging.material(|name| color(mesh, name)),
+    )
+}
+
+/// The ground under a mesh that lies above `min`.
+fn ground(center: Vec3, min: Vec3, radius: f32, up: UpAxis) -> String {
+    let (up, front) = (up.direction(), up.front());
+    let ground = center + up * ((min - center).dot(up) - GROUND_GAP * radius);
+    format!(
+        r#"
+    <shape type="rectangle">
+        <transform name="to_world">
+            <scale value="{size}"/>
+            <lookat origin="{ground}" target="{above}" up="{front}"/>
+        </transform>
+        <bsdf type="twosided"><bsdf type="diffuse"><rgb name="reflectance" value="0.35, 0.35, 0.36"/></bsdf></bsdf>
+    </shape>"#,
+        size = 40.0 * radius,
+        ground = point(ground),
+        above = point(ground + radius * up),
+        front = point(front),
     )
 }
 
@@ -304,7 +300,12 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join(name);
         std::fs::write(&path, text).unwrap();
-        let bare = describe_mesh(&path, UpAxis::Y, &Options::default(), &Budget::default());
+        let bare = describe_mesh(
+            &path,
+            &Staging::default(),
+            &Options::default(),
+            &Budget::default(),
+        );
         bare.unwrap().description
     }
 
@@ -360,7 +361,12 @@ mod tests {
         let obj = "mtllib red.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\n";
         std::fs::write(&path, obj).unwrap();
         let textures = || {
-            let bare = describe_mesh(&path, UpAxis::Y, &Options::default(), &Budget::default());
+            let bare = describe_mesh(
+                &path,
+                &Staging::default(),
+                &Options::default(),
+                &Budget::default(),
+            );
             let scene = bare.unwrap().description;
             let shape = scene.root().children(Kind::Shape)[2];
             assert!(shape.boolean("bare").unwrap());

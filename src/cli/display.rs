@@ -1,0 +1,138 @@
+//! Arguments on how linear values become codes for a screen.
+
+use clap::{Args, ValueEnum};
+use etendue::display::{Depth, DisplayTransform, Exposure, Gamut, Transfer, View};
+
+use super::parse;
+
+/// How PNG is made of linear values.
+#[derive(Args, Debug)]
+pub(super) struct DisplayArguments {
+    /// Make the picture brighter by this many stops, or "auto": the geometric mean of luminance becomes middle
+    /// grey
+    #[arg(long, default_value = "0", value_name = "STOPS|auto", value_parser = exposure, allow_hyphen_values = true, help_heading = DISPLAY)]
+    exposure: Exposure,
+    /// How light beyond the display's range is brought into it
+    #[arg(long, value_enum, default_value_t = Views::Standard, value_name = "NAME", help_heading = DISPLAY)]
+    view: Views,
+    /// How much of the light that is beyond the display's maximum spreads over its neighbourhood, 0 to 1
+    #[arg(long, default_value_t = 0.0, value_name = "PART", value_parser = parse::part, help_heading = DISPLAY)]
+    glare: f32,
+    /// The display's primaries
+    #[arg(long, value_enum, default_value_t = Gamuts::Bt709, value_name = "NAME", help_heading = DISPLAY)]
+    gamut: Gamuts,
+    /// The display's curve: "srgb", "gamma:2.2" or another exponent, "pq" or "hlg" (HDR, as a rule with --gamut
+    /// bt2020 and --bits 16)
+    #[arg(long, default_value = "srgb", value_name = "CURVE", value_parser = transfer, help_heading = DISPLAY)]
+    encode: Transfer,
+    /// Bits of a code
+    #[arg(long, default_value = "8", value_name = "8|16", value_parser = depth, help_heading = DISPLAY)]
+    bits: Depth,
+    /// Hide the bands of smooth gradients by blue noise of less than a code
+    #[arg(long, help_heading = DISPLAY)]
+    dither: bool,
+}
+
+const DISPLAY: &str = "From linear values to PNG";
+
+impl DisplayArguments {
+    /// What they ask for.
+    pub(super) fn transform(&self) -> DisplayTransform {
+        DisplayTransform {
+            exposure: self.exposure,
+            view: match self.view {
+                Views::Standard => View::Standard,
+                Views::Sigmoid => View::Sigmoid,
+                Views::Local => View::Local,
+                Views::Agx => View::Agx,
+                Views::Aces => View::Aces,
+            },
+            glare: self.glare,
+            gamut: match self.gamut {
+                Gamuts::Bt709 => Gamut::Bt709,
+                Gamuts::P3 => Gamut::P3,
+                Gamuts::Bt2020 => Gamut::Bt2020,
+            },
+            transfer: self.encode,
+            depth: self.bits,
+            dither: self.dither,
+        }
+    }
+}
+
+/// See [`View`].
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Views {
+    /// Values above 1 are cut off
+    Standard,
+    /// A sigmoid about the image's mean: all becomes visible, with less contrast
+    Sigmoid,
+    /// By each place's neighbourhood, as dodging and burning: detail stays in light and shadow
+    Local,
+    /// AgX: bright colours go to white as on film
+    Agx,
+    /// ACES 1, the Academy's
+    Aces,
+}
+
+/// See [`Gamut`].
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Gamuts {
+    /// ITU-R BT.709, as sRGB has them
+    Bt709,
+    /// P3 with white D65
+    P3,
+    /// ITU-R BT.2020
+    Bt2020,
+}
+
+/// A number of stops, or `auto`.
+fn exposure(text: &str) -> Result<Exposure, String> {
+    if text == "auto" {
+        return Ok(Exposure::Auto);
+    }
+    match text.parse() {
+        Ok(stops) if (-64.0..=64.0).contains(&stops) => Ok(Exposure::Stops(stops)),
+        _ => Err("write a number of stops from -64 to 64, or \"auto\"".to_owned()),
+    }
+}
+
+/// A curve by its name.
+fn transfer(text: &str) -> Result<Transfer, String> {
+    let exponent = text.strip_prefix("gamma:").map(str::parse);
+    match (text, exponent) {
+        ("srgb", _) => Ok(Transfer::Srgb),
+        ("pq", _) => Ok(Transfer::Pq),
+        ("hlg", _) => Ok(Transfer::Hlg),
+        (_, Some(Ok(exponent))) if (0.1..=10.0).contains(&exponent) => {
+            Ok(Transfer::Gamma(exponent))
+        }
+        _ => Err("there are srgb, gamma:2.2 (0.1 to 10), pq and hlg".to_owned()),
+    }
+}
+
+/// A number of bits.
+fn depth(text: &str) -> Result<Depth, String> {
+    match text {
+        "8" => Ok(Depth::Eight),
+        "16" => Ok(Depth::Sixteen),
+        _ => Err("there are 8 and 16".to_owned()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn curves_and_exposures_are_read_and_bounded() {
+        assert_eq!(transfer("gamma:1.8"), Ok(Transfer::Gamma(1.8)));
+        for wrong in ["gamma:", "gamma:0", "gamma:nan", "gamma:1e9", "sRGB", ""] {
+            assert!(transfer(wrong).is_err(), "{wrong}");
+        }
+        assert_eq!(exposure("-1.5"), Ok(Exposure::Stops(-1.5)));
+        for wrong in ["", "inf", "nan", "1e9", "Auto"] {
+            assert!(exposure(wrong).is_err(), "{wrong}");
+        }
+    }
+}

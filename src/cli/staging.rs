@@ -1,0 +1,130 @@
+//! Arguments on how a bare mesh is shown.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use etendue::render::{Background, Finish, Lighting, Staging, UpAxis};
+use glam::DVec3;
+
+use super::parse;
+
+/// How a bare mesh is shown.
+#[derive(Args, Clone, Debug)]
+pub(super) struct StagingArguments {
+    /// Let the camera stand so many degrees to the right of the front, by default 27
+    #[arg(long, value_name = "DEGREES", value_parser = degrees::<360>, allow_hyphen_values = true, help_heading = BARE)]
+    azimuth: Option<f32>,
+    /// And so many above the horizon, by default 19
+    #[arg(long, value_name = "DEGREES", value_parser = degrees::<90>, allow_hyphen_values = true, help_heading = BARE)]
+    elevation: Option<f32>,
+    /// So many times as far away as where the mesh fills the image
+    #[arg(long, value_name = "TIMES", value_parser = distance, help_heading = BARE)]
+    distance: Option<f32>,
+    /// The field of view of the image's smaller side, by default 30
+    #[arg(long, value_name = "DEGREES", value_parser = fov, help_heading = BARE)]
+    fov: Option<f32>,
+    /// The point that the camera looks at, instead of the one that puts the mesh in the middle
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse::point, allow_hyphen_values = true, help_heading = BARE)]
+    target: Option<DVec3>,
+    /// What the mesh is made of
+    #[arg(long, value_enum, default_value_t = Finishes::Clay, value_name = "NAME", help_heading = BARE)]
+    material: Finishes,
+    /// What lights it: "studio", "sun", "sky", or an image of all around by longitude and latitude
+    #[arg(long, default_value = "studio", value_name = "NAME|IMAGE", help_heading = BARE)]
+    light: String,
+    /// What is seen beside it: "sky", a radiance such as 1,1,1, or "transparent", which leaves out the ground too
+    #[arg(long, default_value = "sky", value_name = "R,G,B|transparent", value_parser = background, help_heading = BARE)]
+    background: Background,
+    /// Let it float
+    #[arg(long, help_heading = BARE)]
+    no_ground: bool,
+    /// Write the scene around the mesh to this file too, to change it or to let Mitsuba render it
+    #[arg(long, value_name = "OUT.xml", help_heading = BARE)]
+    pub(super) write_scene: Option<PathBuf>,
+}
+
+const BARE: &str = "A bare mesh";
+
+impl StagingArguments {
+    /// What they ask for, of an image of this size.
+    pub(super) fn staging(&self, up: UpAxis, size: Option<(u32, u32)>, turns: bool) -> Staging {
+        let default = Staging::default();
+        let aspect = size.filter(|(width, height)| *width > 0 && *height > 0);
+        Staging {
+            up,
+            azimuth: self.azimuth,
+            elevation: self.elevation,
+            distance: self.distance,
+            fov: self.fov,
+            target: self.target,
+            aspect: aspect.map_or(default.aspect, |(width, height)| {
+                width as f32 / height as f32
+            }),
+            all_around: turns,
+            finish: match self.material {
+                Finishes::Clay => Finish::Clay,
+                Finishes::Metal => Finish::Metal,
+                Finishes::Glass => Finish::Glass,
+                Finishes::Plastic => Finish::Plastic,
+            },
+            lighting: match self.light.as_str() {
+                "studio" => Lighting::Studio,
+                "sun" => Lighting::Sun,
+                "sky" => Lighting::Sky,
+                image => Lighting::Environment(image.into()),
+            },
+            background: self.background,
+            ground: !self.no_ground,
+        }
+    }
+}
+
+/// See [`Finish`].
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Finishes {
+    /// Matte, in the mesh's own colours where it has any
+    Clay,
+    /// Rough metal, in the mesh's own colours or aluminium
+    Metal,
+    /// Clear glass
+    Glass,
+    /// Glossy plastic, in the mesh's own colours where it has any
+    Plastic,
+}
+
+/// An angle of at most so many degrees to either side.
+fn degrees<const MOST: i32>(text: &str) -> Result<f32, String> {
+    let most = MOST as f32;
+    let angle: Option<f32> = text.parse().ok();
+    let angle = angle.filter(|angle| (-most..=most).contains(angle));
+    angle.ok_or_else(|| format!("write degrees from -{MOST} to {MOST}"))
+}
+
+/// A field of view.
+fn fov(text: &str) -> Result<f32, String> {
+    let angle: Option<f32> = text.parse().ok();
+    let angle = angle.filter(|angle| (1.0..=170.0).contains(angle));
+    angle.ok_or_else(|| "write degrees from 1 to 170".to_owned())
+}
+
+/// A multiple of a distance.
+fn distance(text: &str) -> Result<f32, String> {
+    let times: Option<f32> = text.parse().ok();
+    let times = times.filter(|times| (0.01..=1000.0).contains(times));
+    times.ok_or_else(|| "write a number from 0.01 to 1000".to_owned())
+}
+
+/// A radiance, or none.
+fn background(text: &str) -> Result<Background, String> {
+    match text {
+        "sky" => return Ok(Background::Sky),
+        "transparent" => return Ok(Background::Transparent),
+        _ => {}
+    }
+    let numbers: Option<Vec<f32>> = text.split(',').map(|t| t.trim().parse().ok()).collect();
+    let possible = |v: &f32| v.is_finite() && *v >= 0.0;
+    match numbers.as_deref() {
+        Some(&[r, g, b]) if [r, g, b].iter().all(possible) => Ok(Background::Color([r, g, b])),
+        _ => Err("write sky, transparent, or a radiance as R,G,B, such as 1,1,1".to_owned()),
+    }
+}

@@ -1,0 +1,231 @@
+//! How a bare mesh is shown: what the command line can ask for, and the parts of the scene that say it.
+
+use std::path::PathBuf;
+
+use glam::{DVec3, Vec3};
+
+/// Which way is up in a mesh file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum UpAxis {
+    /// +y, as most scanned and modelled meshes have it.
+    #[default]
+    Y,
+    /// +z, as CAD and terrain have it.
+    Z,
+}
+
+impl UpAxis {
+    /// Of unit length.
+    pub fn direction(self) -> Vec3 {
+        match self {
+            Self::Y => Vec3::Y,
+            Self::Z => Vec3::Z,
+        }
+    }
+
+    /// Toward who looks at the front, of unit length.
+    pub(super) fn front(self) -> Vec3 {
+        match self {
+            Self::Y => Vec3::Z,
+            Self::Z => Vec3::NEG_Y,
+        }
+    }
+}
+
+/// What a bare mesh is made of.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Finish {
+    /// Matte, in its own colours or those of clay.
+    #[default]
+    Clay,
+    /// Rough metal in its own colours, or aluminium.
+    Metal,
+    /// Clear glass.
+    Glass,
+    /// Glossy plastic in its own colours or those of clay.
+    Plastic,
+}
+
+/// What lights a bare mesh.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum Lighting {
+    /// A lamp beside the camera, and a soft sky.
+    #[default]
+    Studio,
+    /// A sun beside the camera, and a blue sky.
+    Sun,
+    /// An even sky.
+    Sky,
+    /// An image of all around, by longitude and latitude.
+    Environment(PathBuf),
+}
+
+/// What is seen beside a bare mesh.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Background {
+    /// The sky that lights it.
+    #[default]
+    Sky,
+    /// A sky of this radiance, linear BT.709.
+    Color([f32; 3]),
+    /// Nothing: the image has opacity, and there is no ground.
+    Transparent,
+}
+
+/// How a bare mesh is shown.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Staging {
+    /// Which way is up.
+    pub up: UpAxis,
+    /// Degrees that the camera stands to the right of the front.
+    pub azimuth: Option<f32>,
+    /// Degrees that it stands above the horizon, −90 to 90.
+    pub elevation: Option<f32>,
+    /// How far it stands, in parts of the distance from which the mesh fills the image.
+    pub distance: Option<f32>,
+    /// The field of view of the film's smaller side, in degrees, 1 to 170.
+    pub fov: Option<f32>,
+    /// The point that it looks at.
+    pub target: Option<DVec3>,
+    /// The film's width over its height.
+    pub aspect: f32,
+    /// Whether the mesh is to be seen from all around, as a camera on a turntable does.
+    pub all_around: bool,
+    /// What the mesh is made of.
+    pub finish: Finish,
+    /// What lights it.
+    pub lighting: Lighting,
+    /// What is seen beside it.
+    pub background: Background,
+    /// Whether it stands on a ground.
+    pub ground: bool,
+}
+
+impl Default for Staging {
+    fn default() -> Self {
+        Self {
+            up: UpAxis::Y,
+            azimuth: None,
+            elevation: None,
+            distance: None,
+            fov: None,
+            target: None,
+            aspect: 4.0 / 3.0,
+            all_around: false,
+            finish: Finish::Clay,
+            lighting: Lighting::Studio,
+            background: Background::Sky,
+            ground: true,
+        }
+    }
+}
+
+impl Staging {
+    /// Whether another camera is asked for than the file's own.
+    pub(super) fn asks_for_camera(&self) -> bool {
+        let angles = [self.azimuth, self.elevation, self.distance, self.fov];
+        angles.iter().any(Option::is_some) || self.target.is_some()
+    }
+
+    /// Whether there is a ground.
+    pub(super) fn has_ground(&self) -> bool {
+        self.ground && self.background != Background::Transparent
+    }
+
+    /// The mesh's material, around its colour, a `<rgb>` or `<texture>` of this name that `color` makes; `None` of a mesh
+    /// without colours of its own.
+    pub(super) fn material(&self, color: impl Fn(&str) -> Option<String>) -> String {
+        let clay = |name: &str| {
+            let [r, g, b] = crate::mesh::BARE_COLOR;
+            color(name).unwrap_or_else(|| format!(r#"<rgb name="{name}" value="{r}, {g}, {b}"/>"#))
+        };
+        let twosided = |inside: String| format!(r#"<bsdf type="twosided">{inside}</bsdf>"#);
+        match self.finish {
+            Finish::Clay => {
+                let reflectance = clay("reflectance");
+                twosided(format!(r#"<bsdf type="diffuse">{reflectance}</bsdf>"#))
+            }
+            Finish::Plastic => {
+                let reflectance = clay("diffuse_reflectance");
+                twosided(format!(
+                    r#"<bsdf type="roughplastic"><float name="alpha" value="0.1"/>{reflectance}</bsdf>"#
+                ))
+            }
+            Finish::Metal => {
+                let metal = match color("specular_reflectance") {
+                    Some(own) => format!(r#"<string name="material" value="none"/>{own}"#),
+                    None => r#"<string name="material" value="Al"/>"#.to_owned(),
+                };
+                twosided(format!(
+                    r#"<bsdf type="roughconductor"><float name="alpha" value="0.2"/>{metal}</bsdf>"#
+                ))
+            }
+            Finish::Glass => r#"<bsdf type="dielectric"/>"#.to_owned(),
+        }
+    }
+
+    /// The lights around a mesh at `center`; `key` points to where the lamp or the sun is.
+    pub(super) fn lights(&self, center: Vec3, radius: f32, key: Vec3) -> String {
+        let sky = |own: [f32; 3]| {
+            let [r, g, b] = match self.background {
+                Background::Color(color) => color,
+                Background::Sky | Background::Transparent => own,
+            };
+            format!(
+                r#"<emitter type="constant"><rgb name="radiance" value="{r}, {g}, {b}"/></emitter>"#
+            )
+        };
+        match &self.lighting {
+            Lighting::Studio => {
+                let lamp = point(center + 4.0 * radius * key);
+                let size = 0.6 * radius;
+                format!(
+                    r#"{}
+    <shape type="sphere">
+        <point name="center" value="{lamp}"/>
+        <float name="radius" value="{size}"/>
+        <emitter type="area"><rgb name="radiance" value="30, 27, 23"/></emitter>
+    </shape>"#,
+                    sky([0.42, 0.47, 0.55])
+                )
+            }
+            Lighting::Sun => {
+                let direction = point(-key);
+                format!(
+                    r#"{}
+    <emitter type="directional">
+        <vector name="direction" value="{direction}"/>
+        <rgb name="irradiance" value="3, 2.75, 2.3"/>
+    </emitter>"#,
+                    sky([0.22, 0.32, 0.5])
+                )
+            }
+            Lighting::Sky => sky([0.9, 0.95, 1.0]),
+            Lighting::Environment(path) => {
+                let path = std::path::absolute(path).unwrap_or_else(|_| path.clone());
+                let path = quoted(&path.to_string_lossy());
+                // Images of all around have y up.
+                let turn = match self.up {
+                    UpAxis::Y => "",
+                    UpAxis::Z => {
+                        r#"<transform name="to_world"><rotate x="1" angle="90"/></transform>"#
+                    }
+                };
+                format!(
+                    r#"<emitter type="envmap"><string name="filename" value="{path}"/>{turn}</emitter>"#
+                )
+            }
+        }
+    }
+}
+
+/// A point as a scene file has it.
+pub(super) fn point(p: Vec3) -> String {
+    format!("{}, {}, {}", p.x, p.y, p.z)
+}
+
+/// A text as an attribute has it, without parameters.
+pub(super) fn quoted(text: &str) -> String {
+    let text = text.replace('&', "&amp;").replace('"', "&quot;");
+    text.replace('<', "&lt;").replace('$', "&#36;")
+}
