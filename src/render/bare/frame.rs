@@ -32,16 +32,16 @@ pub(super) fn pose(mesh: &Mesh, (min, max): (Vec3, Vec3), staging: &Staging) -> 
     let (center, radius) = ball(min, max);
     // Vertices of no triangle may lie anywhere.
     let vertices = (mesh.positions.iter()).filter(|p| p.cmpge(min).all() && p.cmple(max).all());
-    let up = staging.up.direction();
-    let (front, right) = (staging.up.front(), Vec3::X);
-    let azimuth = staging.azimuth.unwrap_or(AZIMUTH).to_radians();
-    let elevation = staging.elevation.unwrap_or(ELEVATION).to_radians();
+    let up = staging.up.direction().as_dvec3();
+    let (front, right) = (staging.up.front().as_dvec3(), DVec3::X);
+    let azimuth = f64::from(staging.azimuth.unwrap_or(AZIMUTH)).to_radians();
+    let elevation = f64::from(staging.elevation.unwrap_or(ELEVATION)).to_radians();
     let level = azimuth.sin() * right + azimuth.cos() * front;
-    let toward_eye = (elevation.cos() * level + elevation.sin() * up).as_dvec3();
+    let toward_eye = elevation.cos() * level + elevation.sin() * up;
     // Straight from above, the front is below in the image.
-    let upright = (elevation.cos() * up - elevation.sin() * level).as_dvec3();
-    let forward = -toward_eye.normalize();
-    let sideways = forward.cross(upright).normalize();
+    let upright = elevation.cos() * up - elevation.sin() * level;
+    let forward = -toward_eye;
+    let sideways = forward.cross(upright);
     let center = center.as_dvec3();
     let half = f64::from(staging.fov.unwrap_or(FOV)).to_radians() / 2.0;
     let aspect = f64::from(staging.aspect);
@@ -75,13 +75,13 @@ pub(super) fn pose(mesh: &Mesh, (min, max): (Vec3, Vec3), staging: &Staging) -> 
     let away = at.map_or(-depth, |target| target.dot(forward) - depth);
     let target = eye + away * forward;
     let distance = f64::from(staging.distance.unwrap_or(1.0));
-    let turned = azimuth - AZIMUTH.to_radians();
+    let turned = azimuth - f64::from(AZIMUTH).to_radians();
     Pose {
         eye: target - distance * away * forward,
         target,
         up: upright,
-        right: turned.cos() * right - turned.sin() * front,
-        front: turned.sin() * right + turned.cos() * front,
+        right: (turned.cos() * right - turned.sin() * front).as_vec3(),
+        front: (turned.sin() * right + turned.cos() * front).as_vec3(),
     }
 }
 
