@@ -177,7 +177,7 @@ fn scene(bencher: Bencher<'_, '_>, name: &str) {
 
 #[divan::bench(args = [8, 16, 32], sample_count = 5)]
 fn cornell_box_in_bands(bencher: Bencher<'_, '_>, bands: usize) {
-    render_small(bencher, "cornell-box", Colors::Bands(bands));
+    render_small(bencher, "cornell-box", Colors::bands(bands));
 }
 
 fn render_small(bencher: Bencher<'_, '_>, name: &str, colors: Colors) {

@@ -131,6 +131,11 @@ impl Arguments {
             let message = format!("--bands has no like in Mitsuba's variant {variant:?}");
             return Err(Error::input(message).help("take one such as scalar_spectral"));
         }
+        if self.image.band_range.is_some() {
+            let message = "--band-range has no like in Mitsuba";
+            let error = Error::input(message);
+            return Err(error.help("give the scene a specfilm, and compare its channels"));
+        }
         if self.reference.is_some() && self.scenes.len() > 1 {
             let message = "--reference is another form of one scene, and there are several";
             return Err(Error::input(message));

@@ -2,6 +2,7 @@
 //! words mean the same scene to each.
 
 use clap::Args;
+use etendue::color::MAX_BANDS;
 use etendue::description::Description;
 use etendue::error::{Error, Result};
 use etendue::render::{self, Colors, Overrides};
@@ -24,8 +25,11 @@ pub(super) struct ImageArguments {
     #[arg(long, value_name = "X,Y,W,H", value_parser = parse::crop, help_heading = IMAGE)]
     crop: Option<Window>,
     /// Render N spectral bands over 360-830 nm instead of RGB; the image's RGB is made from them
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=32), help_heading = IMAGE)]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=MAX_BANDS as i64), help_heading = IMAGE)]
     pub(super) bands: Option<u8>,
+    /// Bands from A to B nm; R, G and B are then those of the light in that range
+    #[arg(long, value_name = "A,B", value_parser = parse::band_range, requires = "bands", help_heading = IMAGE)]
+    pub(super) band_range: Option<[f32; 2]>,
     /// When the shutter is open, in place of the scene's shutter_open and shutter_close: two times, or degrees of a
     /// frame, which is 360. In --frames the times begin with the frame's, its number divided by --fps
     #[arg(long, value_name = "OPEN,CLOSE|DEGREES", value_parser = parse::shutter, allow_hyphen_values = true, help_heading = IMAGE)]
@@ -84,7 +88,10 @@ impl ImageArguments {
 
     /// RGB or bands.
     pub(super) fn colors(&self) -> Colors {
-        self.bands.map_or(Colors::Rgb, |n| Colors::Bands(n.into()))
+        self.bands.map_or(Colors::Rgb, |n| Colors::Bands {
+            count: n.into(),
+            range: self.band_range,
+        })
     }
 
     /// Which sensors are meant, if that is said.

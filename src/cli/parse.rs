@@ -190,6 +190,20 @@ impl Shutter {
     }
 }
 
+/// `380,780`
+pub(super) fn band_range(text: &str) -> Parsed<[f32; 2]> {
+    const HOW: &str = "write it as A,B in nm, such as 380,780";
+    let numbers: Option<Vec<f32>> = text.split(',').map(|t| t.trim().parse().ok()).collect();
+    match numbers.as_deref() {
+        Some([a, b]) if !(1.0..=1e6).contains(a) || !(1.0..=1e6).contains(b) => {
+            Err(format!("{text} is not between 1 and 1e6 nm"))
+        }
+        Some([a, b]) if a >= b => Err(format!("{b} nm is not above {a} nm; {HOW}")),
+        Some([a, b]) => Ok([*a, *b]),
+        _ => Err(HOW.to_owned()),
+    }
+}
+
 /// `0,0.5` or `180`
 pub(super) fn shutter(text: &str) -> Parsed<Shutter> {
     const HOW: &str = "write it as OPEN,CLOSE, such as 0,0.5, or in degrees, such as 180";

@@ -1,242 +1,167 @@
-//! N spectral bands: the visible range, 360–830 nm, cut into equal bands. A path carries one wavelength
-//! a band, all shifted inside their bands by one shared random number, so that a band's value is an
+//! N spectral bands: a range, by default the visible one of 360–830 nm, cut into equal bands. A path carries one
+//! wavelength a band, all shifted inside their bands by one shared random number, so that a band's value is an
 //! unbiased average over the band. XYZ is summed per sample at the sampled wavelengths, never from band
-//! averages, so that the RGB image is unbiased whatever N.
+//! averages, so that the RGB image is unbiased whatever N. A film of responses has a channel for each of them
+//! in place of the bands.
 
 use std::sync::Arc;
 
 use super::cie;
+use super::comb::Comb;
 use super::d65::d65;
 use super::model::{Color, ColorModel, Role, xyz_to_rgb};
-use super::rgb::{check, curve};
-use super::samples::{Columns, Samples, Spectra as _, Spectral};
+use super::response::Response;
+use super::samples::{Columns, Samples, Spectra as _, Spectral as _};
+use super::spectrum::{Spectrum, Upsampled};
 use super::texels::Pixels;
-use super::upsample::{Sigmoid, Table, fit};
-use crate::lanes::{Ints as _, Kernel, Lanes, Task};
+use super::upsample::Table;
+use crate::lanes::{Ints as _, Kernel, Lanes, Task, Vec2};
 
 /// Up to `N` bands in `N` lanes; lanes in excess carry nothing.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Bands<const N: usize> {
-    count: usize,
+    comb: Comb,
+    responses: Arc<[Response]>,
 }
 
 impl<const N: usize> Bands<N> {
-    /// `count` bands; `None` unless 1 ≤ count ≤ `N`.
-    pub fn new(count: usize) -> Option<Self> {
-        (1..=N).contains(&count).then_some(Self { count })
+    /// The bands of a comb, and what a film makes of them: its channels, or the bands themselves where there are none;
+    /// `None` where there are more than `N`.
+    pub fn new(comb: Comb, responses: Arc<[Response]>) -> Option<Self> {
+        (comb.count() <= N).then_some(Self { comb, responses })
     }
 
-    /// A band's width in nm.
-    fn width(&self) -> f32 {
-        (cie::LAST - cie::FIRST) / self.count as f32
-    }
-}
-
-/// A spectrum over wavelength.
-#[derive(Clone, Debug)]
-pub enum Spectrum {
-    /// The same everywhere.
-    Flat(f32),
-    /// Scale times a reflectance that was upsampled from RGB, times D65 where it is light.
-    Upsampled {
-        /// The factor.
-        scale: f32,
-        /// The shape.
-        sigmoid: Sigmoid,
-        /// Whether D65 multiplies it.
-        illuminant: bool,
-    },
-    /// Points of (nm, value).
-    Curve(Arc<[(f64, f64)]>),
-}
-
-impl Spectrum {
-    fn at(&self, lambda: f32) -> f32 {
-        match self {
-            Self::Flat(value) => *value,
-            Self::Upsampled {
-                scale,
-                sigmoid,
-                illuminant,
-            } => {
-                let light = if *illuminant { d65(lambda) } else { 1.0 };
-                scale * light * sigmoid.eval(lambda)
-            }
-            Self::Curve(points) => curve(points, f64::from(lambda)) as f32,
-        }
+    /// `count` bands over the visible range; `None` unless 1 ≤ count ≤ `N`.
+    pub fn visible(count: usize) -> Option<Self> {
+        Self::new(Comb::new(count, super::VISIBLE)?, Arc::default())
     }
 }
 
-/// A texel's upsampled spectrum.
-#[derive(Clone, Copy, Debug)]
-pub struct SpectralTexel {
-    scale: f32,
-    sigmoid: Sigmoid,
-    illuminant: bool,
-}
-
-impl SpectralTexel {
-    fn new(table: &Table, rgb: [f32; 3], role: Role) -> Self {
-        let (scale, rgb) = match role {
-            Role::Reflectance => (1.0, rgb.map(|v| v.clamp(0.0, 1.0))),
-            Role::Emission | Role::Quantity | Role::Tabulated => scaled(rgb),
-        };
-        Self {
-            scale,
-            sigmoid: table.lookup(rgb),
-            illuminant: role == Role::Emission,
-        }
-    }
-
-    #[inline]
-    fn evaluate<const N: usize>(&self, wavelengths: &[f32; N]) -> Samples<N> {
-        Samples(wavelengths.map(|l| {
-            let light = if self.illuminant { d65(l) } else { 1.0 };
-            self.scale * light * self.sigmoid.eval(l)
-        }))
-    }
-}
-
-/// Splits an RGB triple of any brightness into a scale and a reflectance, as Mitsuba does for light.
-fn scaled(rgb: [f32; 3]) -> (f32, [f32; 3]) {
-    let scale = 2.0 * rgb[0].max(rgb[1]).max(rgb[2]);
-    if scale > 0.0 {
-        (scale, rgb.map(|v| v / scale))
-    } else {
-        (0.0, [0.0; 3])
-    }
+/// How bands are called in spectral images: S0 is intensity without regard to polarisation, then the middle of the band,
+/// with a comma, for a dot would begin a layer (Fichet, Pacanowski and Wilkie, *An OpenEXR layout for spectral images*,
+/// JCGT 10 (3), 2021).
+fn band_name(comb: &Comb, band: usize) -> String {
+    let centre = format!("{:.6}", comb.centre(band)).replace('.', ",");
+    format!("S0.{centre}nm")
 }
 
 impl<const N: usize> ColorModel for Bands<N> {
     type Stored = Spectrum;
-    type Texels = Vec<SpectralTexel>;
-    /// nm; 0 in the lanes that are not in use.
+    type Texels = Vec<Upsampled>;
+    /// nm; lanes that are not in use have the first band's.
     type Wavelengths = [f32; N];
     type Sample = Samples<N>;
     type Columns<F: Lanes> = Columns<F, N>;
 
-    fn run<T: Task>(_kernel: Kernel, task: T) -> T::Output {
-        task.run::<f32>()
+    fn run<T: Task>(kernel: Kernel, task: T) -> T::Output {
+        kernel.run_single(task)
     }
 
     #[inline]
     fn wavelengths(&self, u: impl FnOnce() -> f32) -> [f32; N] {
-        let (u, width) = (u(), self.width());
-        std::array::from_fn(|i| {
-            if i < self.count {
-                cie::FIRST + (i as f32 + u) * width
-            } else {
-                0.0
-            }
-        })
+        let (u, count) = (u(), self.comb.count());
+        std::array::from_fn(|i| self.comb.wavelength(if i < count { i } else { 0 }, u))
+    }
+
+    #[inline(always)]
+    fn narrowed(wavelengths: &[f32; N], throughput: &Samples<N>) -> [f32; N] {
+        let carrying = throughput.0.iter().filter(|v| **v != 0.0).count();
+        let only = throughput.0.iter().position(|v| *v != 0.0);
+        match only.filter(|_| carrying == 1) {
+            Some(only) => [wavelengths[only]; N],
+            None => *wavelengths,
+        }
     }
 
     fn unit(&self) -> Samples<N> {
-        Samples::from_fn(|i| if i < self.count { 1.0 } else { 0.0 })
+        Samples::from_fn(|i| if i < self.comb.count() { 1.0 } else { 0.0 })
     }
 
     fn store(&self, color: &Color, role: Role) -> Result<Spectrum, String> {
-        let light = role == Role::Emission;
-        Ok(match color {
-            Color::D65(rgb) => {
-                check(*rgb, role.unbounded())?;
-                let (scale, rgb) = scaled(rgb.map(|v| v as f32));
-                Spectrum::Upsampled {
-                    scale,
-                    sigmoid: fit(rgb),
-                    illuminant: true,
-                }
-            }
-            Color::Grey(value) => {
-                check([*value], role)?;
-                let (scale, grey) = (2.0 * *value as f32, Sigmoid::constant(0.5));
-                if light {
-                    Spectrum::Upsampled {
-                        scale,
-                        sigmoid: grey,
-                        illuminant: true,
-                    }
-                } else {
-                    Spectrum::Flat(*value as f32)
-                }
-            }
-            Color::Flat(value) => {
-                check([*value], role)?;
-                Spectrum::Flat(*value as f32)
-            }
-            Color::Rgb(rgb) => {
-                check(*rgb, role)?;
-                let rgb = rgb.map(|v| v as f32);
-                match role {
-                    Role::Reflectance => Spectrum::Upsampled {
-                        scale: 1.0,
-                        sigmoid: fit(rgb),
-                        illuminant: false,
-                    },
-                    Role::Emission | Role::Quantity | Role::Tabulated => {
-                        let (scale, rgb) = scaled(rgb);
-                        Spectrum::Upsampled {
-                            scale,
-                            sigmoid: fit(rgb),
-                            illuminant: light,
-                        }
-                    }
-                }
-            }
-            Color::Curve(points) => {
-                check(
-                    points.iter().map(|p| p.1),
-                    if light { role } else { Role::Quantity },
-                )?;
-                let bounded = |v: f64| {
-                    if role == Role::Reflectance {
-                        v.clamp(0.0, 1.0)
-                    } else {
-                        v
-                    }
-                };
-                Spectrum::Curve(points.iter().map(|p| (p.0, bounded(p.1))).collect())
-            }
-        })
+        Spectrum::new(color, role)
+    }
+
+    fn upsamples(&self) -> bool {
+        true
     }
 
     #[inline]
     fn evaluate(stored: &Spectrum, wavelengths: &[f32; N]) -> Samples<N> {
-        Samples(wavelengths.map(|l| stored.at(l)))
+        Samples(stored.sample(wavelengths))
     }
 
     fn evaluate_rgb(&self, rgb: [f32; 3], role: Role, wavelengths: &[f32; N]) -> Samples<N> {
-        SpectralTexel::new(Table::shared(), rgb, role).evaluate(wavelengths)
+        let texel = Upsampled::of_texel(Table::shared(), rgb, role);
+        Samples(texel.sample(wavelengths))
     }
 
     fn texel_bytes(_pixels: &Pixels) -> usize {
-        size_of::<SpectralTexel>()
+        size_of::<Upsampled>()
     }
 
-    fn texels(&self, pixels: Pixels, role: Role) -> Vec<SpectralTexel> {
+    fn texels(&self, pixels: Pixels, role: Role) -> Vec<Upsampled> {
         let table = Table::shared();
-        let texel = |rgb| SpectralTexel::new(table, rgb, role);
+        let texel = |rgb| Upsampled::of_texel(table, rgb, role);
         pixels.iter().map(texel).collect()
     }
 
     #[inline(always)]
     fn evaluate_texels<F: Lanes>(
-        texels: &Vec<SpectralTexel>,
+        texels: &Vec<Upsampled>,
         index: F::Int,
         wavelengths: &[[f32; N]],
     ) -> Columns<F, N> {
         let mut row = F::Int::ROW;
         index.store(&mut row);
         Columns::from_samples(|lane| {
-            let index = row[lane] as usize;
-            let texel = &texels[index.min(texels.len() - 1)];
-            texel.evaluate(&wavelengths[lane])
+            Samples::<N>(texel(texels, row[lane]).sample(&wavelengths[lane]))
+        })
+    }
+
+    /// As Mitsuba's spectral variants do it: scale and shape are interpolated apart, and then multiplied.
+    #[inline(always)]
+    fn evaluate_between<F: Lanes>(
+        texels: &Vec<Upsampled>,
+        corners: [[F::Int; 2]; 2],
+        place: Vec2<F>,
+        wavelengths: &[[f32; N]],
+    ) -> Columns<F, N> {
+        let (across, down) = (place.x.row(), place.y.row());
+        let mut rows = [[F::Int::ROW; 2]; 2];
+        for y in 0..2 {
+            for x in 0..2 {
+                corners[y][x].store(&mut rows[y][x]);
+            }
+        }
+        Columns::from_samples(|lane| {
+            let (fx, fy) = (across[lane], down[lane]);
+            let mut scale = 0.0;
+            let mut shape = [0.0; N];
+            for (row, wy) in rows.iter().zip([1.0 - fy, fy]) {
+                for (corner, wx) in row.iter().zip([1.0 - fx, fx]) {
+                    let texel = texel(texels, corner[lane]);
+                    let weight = wx * wy;
+                    scale += weight * texel.scale;
+                    for (sum, l) in shape.iter_mut().zip(&wavelengths[lane]) {
+                        *sum += weight * texel.sigmoid.eval(*l);
+                    }
+                }
+            }
+            let light = texel(texels, rows[0][0][lane]).illuminant;
+            Samples::<N>::from_fn(|i| {
+                let power = if light {
+                    d65(wavelengths[lane][i])
+                } else {
+                    1.0
+                };
+                scale * shape[i] * power
+            })
         })
     }
 
     fn luminance(&self, sample: &Samples<N>, wavelengths: &[f32; N]) -> f32 {
         let (mut sum, mut white) = (0.0, 0.0);
-        for i in 0..self.count {
+        for i in 0..self.comb.count() {
             let weight = cie::xyz(wavelengths[i])[1];
             sum += weight * sample[i];
             white += weight;
@@ -245,31 +170,42 @@ impl<const N: usize> ColorModel for Bands<N> {
     }
 
     fn channels(&self) -> Vec<String> {
-        let width = self.width();
-        let edge = |i: usize| cie::FIRST + i as f32 * width;
         let mut names = ["R", "G", "B"].map(String::from).to_vec();
-        // Zero-padded, for EXR sorts its channels by name.
-        names.extend(
-            (0..self.count).map(|i| format!("band.{i:02}_{:.1}-{:.1}nm", edge(i), edge(i + 1))),
-        );
+        match self.responses.is_empty() {
+            true => names.extend((0..self.comb.count()).map(|i| band_name(&self.comb, i))),
+            false => names.extend(self.responses.iter().map(|r| r.name.clone())),
+        }
         names
     }
 
     fn develop(&self, sample: &Samples<N>, wavelengths: &[f32; N], out: &mut [f32]) {
         let mut xyz = [0.0; 3];
-        for i in 0..self.count {
+        let count = self.comb.count();
+        for i in 0..count {
             let weight = cie::xyz(wavelengths[i]);
             for c in 0..3 {
                 xyz[c] += f64::from(sample[i] * weight[c]);
             }
         }
-        let scale = f64::from(self.width() * cie::NORMALIZATION);
+        let scale = f64::from(self.comb.width() * cie::NORMALIZATION);
         let rgb = xyz_to_rgb(xyz.map(|v| v * scale));
         for c in 0..3 {
             out[c] = rgb[c] as f32;
         }
-        out[3..3 + self.count].copy_from_slice(&sample.0[..self.count]);
+        let (values, wavelengths) = (&sample.0[..count], &wavelengths[..count]);
+        if self.responses.is_empty() {
+            out[3..3 + count].copy_from_slice(values);
+        }
+        for (out, response) in out[3..].iter_mut().zip(self.responses.iter()) {
+            *out = response.of(&self.comb, values, wavelengths);
+        }
     }
+}
+
+/// A texel; what is beyond the last is that.
+#[inline(always)]
+fn texel(texels: &[Upsampled], index: u32) -> &Upsampled {
+    &texels[(index as usize).min(texels.len() - 1)]
 }
 
 #[cfg(test)]
@@ -278,7 +214,7 @@ mod tests {
 
     /// The RGB that N bands make of a colour, averaged over shifts of the comb.
     fn rgb_of<const N: usize>(count: usize, color: &Color, role: Role, light: &Color) -> [f64; 3] {
-        let bands = Bands::<N>::new(count).unwrap();
+        let bands = Bands::<N>::visible(count).unwrap();
         let (color, light) = (
             bands.store(color, role).unwrap(),
             bands.store(light, Role::Emission).unwrap(),

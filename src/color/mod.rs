@@ -8,17 +8,23 @@ pub mod srgb;
 pub mod upsample;
 
 mod bands;
+mod comb;
 mod model;
 mod mono;
 mod primaries;
+mod response;
 mod rgb;
 mod samples;
+mod spectrum;
 mod texels;
 
 pub use bands::Bands;
+pub use comb::{Comb, MAX_BANDS, VISIBLE};
 pub use model::{Color, ColorModel, Role, luminance, rgb_to_xyz, xyz_to_rgb};
 pub use mono::Mono;
 pub use primaries::Primaries;
+pub use response::Response;
 pub use rgb::Rgb;
 pub use samples::{Columns, Samples, Spectra, Spectral};
+pub use spectrum::Spectrum;
 pub use texels::{Packed, Pixels};

@@ -4,7 +4,7 @@
 
 use super::samples::{Spectra, Spectral};
 use super::texels::Pixels;
-use crate::lanes::{Kernel, Lanes, Task};
+use crate::lanes::{Kernel, Lanes, Task, Vec2};
 
 /// A colour as a scene file gives it.
 #[derive(Clone, Debug, PartialEq)]
@@ -64,6 +64,12 @@ pub trait ColorModel: Clone + std::fmt::Debug + Send + Sync + 'static {
 
     /// The wavelengths of a path, from a random number in [0, 1), which is drawn where there are any.
     fn wavelengths(&self, u: impl FnOnce() -> f32) -> Self::Wavelengths;
+    /// The wavelengths of a path that goes on with `throughput`: where a single one carries anything, all are that one, so
+    /// that a boundary that parts wavelengths does not part it again.
+    #[inline(always)]
+    fn narrowed(wavelengths: &Self::Wavelengths, _throughput: &Self::Sample) -> Self::Wavelengths {
+        *wavelengths
+    }
     /// The throughput at a path's start: 1 in each channel in use.
     fn unit(&self) -> Self::Sample;
     /// A scene's colour in its stored form; the error says what is wrong with the value.
@@ -74,6 +80,10 @@ pub trait ColorModel: Clone + std::fmt::Debug + Send + Sync + 'static {
     }
     /// Whether spectra become three numbers.
     fn is_rgb(&self) -> bool {
+        false
+    }
+    /// Whether colours become spectra.
+    fn upsamples(&self) -> bool {
         false
     }
     /// A stored colour at a path's wavelengths.
@@ -103,6 +113,23 @@ pub trait ColorModel: Clone + std::fmt::Debug + Send + Sync + 'static {
         index: F::Int,
         wavelengths: &[Self::Wavelengths],
     ) -> Self::Columns<F>;
+
+    /// Texels between four neighbours, two rows of two, at a place between them in [0, 1)².
+    #[inline(always)]
+    fn evaluate_between<F: Lanes>(
+        texels: &Self::Texels,
+        corners: [[F::Int; 2]; 2],
+        place: Vec2<F>,
+        wavelengths: &[Self::Wavelengths],
+    ) -> Self::Columns<F> {
+        let [upper, lower] = corners;
+        let gx = F::one() - place.x;
+        let above = Self::evaluate_texels(texels, upper[0], wavelengths) * gx
+            + Self::evaluate_texels(texels, upper[1], wavelengths) * place.x;
+        let below = Self::evaluate_texels(texels, lower[0], wavelengths) * gx
+            + Self::evaluate_texels(texels, lower[1], wavelengths) * place.x;
+        above * (F::one() - place.y) + below * place.y
+    }
 
     /// The luminance of a reflectance: 1 for white.
     fn luminance(&self, sample: &Self::Sample, wavelengths: &Self::Wavelengths) -> f32;

@@ -101,7 +101,7 @@ impl Scene {
         let notes = show_emitters(&mut description, &order.variant);
         let options = Options {
             threads: order.threads.and_then(|n| NonZeroUsize::new(n as usize)),
-            colors: order.bands.map_or(Colors::Rgb, |n| Colors::Bands(n.into())),
+            colors: order.bands.map_or(Colors::Rgb, |n| Colors::bands(n.into())),
             sensor,
             ..Options::default()
         };

@@ -64,6 +64,8 @@ pub enum Takes {
     Number,
     /// A number, or the name of a substance.
     Substance,
+    /// The same, or a spectrum.
+    Index,
     /// A nested texture.
     Map,
     /// A nested plugin of that kind, or several.
@@ -192,6 +194,7 @@ impl fmt::Display for Takes {
             Self::Texture => f.write_str("color or texture"),
             Self::Number => f.write_str("float or texture"),
             Self::Substance => f.write_str("float or substance"),
+            Self::Index => f.write_str("float, substance or spectrum"),
             Self::Map => f.write_str("texture"),
             Self::Nested(kind) => write!(f, "nested {kind}"),
         }
@@ -371,6 +374,11 @@ pub const fn number(name: &'static str, preset: f64, about: &'static str) -> Row
 /// An index of refraction: a number or the name of a substance.
 pub const fn substance(name: &'static str, preset: &'static str, about: &'static str) -> Row {
     Row::new(name, Takes::Substance, Preset::Text(preset), about)
+}
+
+/// The same, or a spectrum.
+pub const fn index(name: &'static str, preset: &'static str, about: &'static str) -> Row {
+    Row::new(name, Takes::Index, Preset::Text(preset), about)
 }
 
 /// A nested texture, which a scene has to give.

@@ -406,6 +406,14 @@ impl<'a> Properties<'a> {
         }
     }
 
+    /// The plugin that one of the properties holds.
+    pub fn held(&self, property: &Property) -> Option<Properties<'a>> {
+        match property.value {
+            Value::Object(id) => Some(self.description.node(id)),
+            _ => None,
+        }
+    }
+
     /// All properties in file order.
     pub fn all(&self) -> &'a [Property] {
         &self.node.properties

@@ -241,7 +241,7 @@ impl Sums {
             let rgb = [value(0), value(1), value(2)];
             let (main, rest) = out.split_at_mut(main.len());
             let color = match format.colors {
-                Coordinates::Rgb => rgb,
+                Coordinates::Rgb | Coordinates::None => rgb,
                 Coordinates::Luminance => [luminance(rgb); 3],
                 Coordinates::Xyz => rgb_to_xyz(rgb),
             };

@@ -259,6 +259,14 @@ mod tests {
             let expected = expected.get_or_insert_with(|| found.clone());
             assert!(found == *expected, "{}", kernel.name());
         }
+        let (text, mut scene) = self::scene(Bands::<8>::visible(5).unwrap());
+        let mut expected = None;
+        for kernel in Kernel::all() {
+            scene = scene.with_kernel(kernel);
+            let found = bits(&scene, &text, 300);
+            let expected = expected.get_or_insert_with(|| found.clone());
+            assert!(found == *expected, "bands, {}", kernel.name());
+        }
     }
 
     /// Which paths share a block does not matter to any of them.
@@ -270,7 +278,7 @@ mod tests {
             let few = bits(&scene, &text, count);
             assert!(few == many[..few.len()], "{count}");
         }
-        let (text, scene) = self::scene(Bands::<8>::new(5).unwrap());
+        let (text, scene) = self::scene(Bands::<8>::visible(5).unwrap());
         let many = bits(&scene, &text, 300);
         let few = bits(&scene, &text, 20);
         assert!(few == many[..few.len()]);

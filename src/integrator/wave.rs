@@ -186,8 +186,10 @@ impl<C: ColorModel, T> Outcome<'_, C, T> {
             let origin = Vec3::<F>::of(&origins, lane);
             let direction = Vec3::<F>::of(&directions, lane);
             let ray = block.ray(lane, origin, direction, f32::INFINITY);
+            let throughput = C::Columns::<F>::of(&throughputs, lane);
             let walker = Walker {
-                throughput: C::Columns::<F>::of(&throughputs, lane),
+                throughput,
+                wavelengths: C::narrowed(&block.walker(lane).wavelengths, &throughput),
                 eta: etas[lane],
                 scattered,
                 ..*block.walker(lane)

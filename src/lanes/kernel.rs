@@ -82,6 +82,17 @@ impl Kernel {
             Set::Avx512 => unsafe { x86::avx512::run(task) },
         }
     }
+
+    /// Does `task` with one lane, where the instructions serve the channels of each path: those of AVX2 at most, for a
+    /// task takes long to compile and is not faster with wider registers.
+    pub fn run_single<T: Task>(self, task: T) -> T::Output {
+        match self.0 {
+            Set::Portable => task.run::<f32>(),
+            // SAFETY: a `Kernel` exists only where the processor has its instructions, and what has AVX-512 has AVX2.
+            #[cfg(target_arch = "x86_64")]
+            Set::Avx2 | Set::Avx512 => unsafe { x86::avx2::run_single(task) },
+        }
+    }
 }
 
 impl Default for Kernel {

@@ -133,14 +133,10 @@ impl<C: ColorModel> Envmap<C> {
         let y = qy.to_int().min(all(height - 2));
         let (fx, fy) = (qx - x.to_float(), qy - y.to_float());
         let next = F::Int::select(x.eq(all(width - 1)), all(0), x + all(1));
-        let texels = &self.texels;
         let (upper, lower) = (y * all(width), (y + all(1)) * all(width));
-        let (gx, gy) = (F::one() - fx, F::one() - fy);
-        let above = C::evaluate_texels(texels, upper + x, w) * gx
-            + C::evaluate_texels(texels, upper + next, w) * fx;
-        let below = C::evaluate_texels(texels, lower + x, w) * gx
-            + C::evaluate_texels(texels, lower + next, w) * fx;
-        (above * gy + below * fy) * F::splat(self.scale)
+        let corners = [[upper + x, upper + next], [lower + x, lower + next]];
+        let place = lanes::Vec2::new(fx, fy);
+        C::evaluate_between(&self.texels, corners, place, w) * F::splat(self.scale)
     }
 
     /// Density per solid angle of a point drawn with that density.

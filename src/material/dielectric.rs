@@ -1,7 +1,9 @@
 //! `dielectric`: the clear boundary of two media, such as glass (`int_ior`, bk7 by default) in air
 //! (`ext_ior`). It reflects the Fresnel share and refracts the rest, whose radiance changes by 1/η².
-//! `specular_reflectance` and `specular_transmittance` (1) multiply.
+//! `specular_reflectance` and `specular_transmittance` (1) multiply. Where an index is a spectrum, an extension, bands are
+//! refracted apart ([`dispersion`](super::dispersion)).
 
+use super::dispersion::Dispersion;
 use super::{BlockBsdf, Bsdf, BsdfSamples, Lobes, fresnel, ior, single_face};
 use crate::color::{ColorModel, Role};
 use crate::description::Properties;
@@ -16,6 +18,8 @@ use crate::texture::{Palettes, Texture};
 pub struct Dielectric<C: ColorModel> {
     /// Index of refraction, inside over outside.
     eta: f32,
+    /// The same over wavelength, where it depends on that.
+    dispersion: Option<Box<Dispersion<C>>>,
     specular_reflectance: Texture<C>,
     specular_transmittance: Texture<C>,
 }
@@ -45,13 +49,14 @@ pub(super) fn factors<C: ColorModel>(
 impl<C: ColorModel> Dielectric<C> {
     pub(super) const PLUGIN: Plugin = Plugin {
         about: "smooth glass",
-        properties: &[&super::ior::dielectric("bk7"), FACTORS],
+        properties: &[&super::ior::dispersive("bk7"), FACTORS],
     };
 
     pub(super) fn build(properties: &Properties<'_>, palettes: &Palettes<C>) -> Result<Self> {
         let [specular_reflectance, specular_transmittance] = factors(properties, palettes)?;
         Ok(Self {
-            eta: ior::relative(properties)?,
+            eta: ior::relative_of_yellow(properties)?,
+            dispersion: Dispersion::build(properties, palettes)?,
             specular_reflectance,
             specular_transmittance,
         })
@@ -76,9 +81,16 @@ impl<C: ColorModel> BlockBsdf<C> for Dielectric<C> {
         at: &Points<'_, F>,
         wi: Vec3<F>,
         u1: F,
-        _u2: Vec2<F>,
+        u2: Vec2<F>,
         w: &[C::Wavelengths],
     ) -> BsdfSamples<F, C::Columns<F>> {
+        if let Some(dispersion) = &self.dispersion {
+            let factors = [
+                self.specular_reflectance.eval_lanes(at, w),
+                self.specular_transmittance.eval_lanes(at, w),
+            ];
+            return dispersion.sample(wi, [u1, u2.x], factors, w);
+        }
         let boundary = fresnel::dielectric(wi.z, self.eta);
         let all = F::Mask::splat(true);
         let reflected = BsdfSamples::delta(

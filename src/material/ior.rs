@@ -3,13 +3,14 @@
 //! `conductors.txt`.
 
 use super::fresnel;
-use crate::color::{Color, ColorModel, Role};
-use crate::description::declared::{Row, string, substance, texture};
+use crate::color::{Bands, Color, ColorModel, Role, Spectral as _};
+use crate::description::declared::{self, Row, string, substance, texture};
+use crate::description::properties::STRICT;
 use crate::description::{Properties, Value};
 use crate::error::{Error, Result};
 use crate::interaction::Points;
 use crate::lanes::Lanes;
-use crate::texture::{Palettes, Texture};
+use crate::texture::{Palette, Palettes, Texture};
 
 /// Substances by name and index.
 const SUBSTANCES: &[(&str, f64)] = &[
@@ -46,6 +47,14 @@ pub(super) const fn dielectric(interior: &'static str) -> [Row; 2] {
     ]
 }
 
+/// The same, which may depend on wavelength.
+pub(super) const fn dispersive(interior: &'static str) -> [Row; 2] {
+    [
+        declared::index("int_ior", interior, "index of refraction on the inside").positive(),
+        declared::index("ext_ior", "air", "index of refraction on the outside").positive(),
+    ]
+}
+
 /// A metal's index.
 pub(super) const CONDUCTOR: &[Row] = &[
     string(
@@ -62,9 +71,84 @@ pub(super) fn relative(properties: &Properties<'_>) -> Result<f32> {
     Ok((index(properties, "int_ior")? / index(properties, "ext_ior")?) as f32)
 }
 
+/// Fraunhofer's line D, in nm, at which an index is told that is one number.
+const YELLOW: f32 = 589.3;
+
+/// As [`relative`], of spectra their values at 589.3 nm.
+pub(super) fn relative_of_yellow(properties: &Properties<'_>) -> Result<f32> {
+    let yellow = Palettes::new(Bands::<1>::visible(1).expect("one band is possible"));
+    let index = |name| match medium(properties, &yellow, name)? {
+        Medium::Same(index) => Ok::<_, Error>(index),
+        Medium::Spectrum(spectrum) => Ok(f64::from(spectrum.at(YELLOW))),
+    };
+    Ok((index("int_ior")? / index("ext_ior")?) as f32)
+}
+
+/// The index of refraction on a side of a boundary.
+#[derive(Clone, Debug)]
+pub(super) enum Medium<C: ColorModel> {
+    /// The same at all wavelengths.
+    Same(f64),
+    /// Over wavelength.
+    Spectrum(C::Stored),
+}
+
+impl<C: ColorModel> Medium<C> {
+    /// At a path's wavelengths.
+    #[inline(always)]
+    pub(super) fn at(&self, wavelengths: &C::Wavelengths) -> C::Sample {
+        match self {
+            Self::Same(index) => C::Sample::splat(*index as f32),
+            Self::Spectrum(stored) => C::evaluate(stored, wavelengths),
+        }
+    }
+}
+
+/// The index that the property `name` gives.
+pub(super) fn medium<C: ColorModel>(
+    properties: &Properties<'_>,
+    palettes: &Palettes<C>,
+    name: &'static str,
+) -> Result<Medium<C>> {
+    let property = match properties.value(name) {
+        Some(property) if matches!(property.value, Value::Spectrum(_) | Value::Object(_)) => {
+            property
+        }
+        _ => return Ok(Medium::Same(index(properties, name)?)),
+    };
+    if properties.is_strict() {
+        let message = format!("{name:?} over wavelength is Étendue's own");
+        return Err(properties.error(name, message).help(STRICT));
+    }
+    let palette: &Palette<C> = &palettes.colors;
+    let Some(stored) = palette.spectrum(properties, property, Role::Quantity)? else {
+        return Err(properties.error(
+            name,
+            format!("{name:?} is a number, a substance or a spectrum"),
+        ));
+    };
+    for u in [0.0, 0.5, 1f32.next_down()] {
+        let indices = C::evaluate(&stored, &palette.color.wavelengths(|| u));
+        for channel in 0..C::Sample::LANES {
+            let index = indices[channel];
+            if !(index > 0.0 && index.is_finite()) {
+                let message = format!(
+                    "an index of refraction is above 0 at all wavelengths of the bands, and {index} is not"
+                );
+                return Err(properties.error(name, message));
+            }
+        }
+    }
+    Ok(Medium::Spectrum(stored))
+}
+
 /// As [`relative`], for models that need the two to differ.
 pub(super) fn relative_and_different(properties: &Properties<'_>) -> Result<f32> {
-    let eta = relative(properties)?;
+    different(properties, relative(properties)?)
+}
+
+/// The index, unless it is 1.
+pub(super) fn different(properties: &Properties<'_>, eta: f32) -> Result<f32> {
     if eta == 1.0 {
         let message =
             "int_ior and ext_ior must differ: an interface between equal media is invisible";
@@ -181,11 +265,18 @@ fn conductor(name: &str) -> Result<(Curve, Curve)> {
         .split(' ')
         .map(|number| number.parse().expect("the table holds numbers"))
         .collect();
-    let points = || numbers.chunks_exact(3);
-    Ok((
-        points().map(|p| (p[0], p[1])).collect(),
-        points().map(|p| (p[0], p[2])).collect(),
-    ))
+    let curve = |column: usize| numbers.chunks_exact(3).map(|p| (p[0], p[column])).collect();
+    Ok((beyond(curve(1)), beyond(curve(2))))
+}
+
+/// With the values at the ends of the table beyond them, where bands may lie.
+fn beyond(mut curve: Curve) -> Curve {
+    const FARTHEST: f64 = 1e7;
+    if let (Some(first), Some(last)) = (curve.first().copied(), curve.last().copied()) {
+        curve.insert(0, (0.0, first.1));
+        curve.push((FARTHEST, last.1));
+    }
+    curve
 }
 
 #[cfg(test)]

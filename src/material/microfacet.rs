@@ -311,9 +311,21 @@ impl<F: Lanes> Interface<F> {
     /// Of a boundary whose index is `eta` inside over outside.
     #[inline(always)]
     pub(super) fn between(wi: Vec3<F>, wo: Vec3<F>, eta: f32) -> Self {
+        Self::between_either_way(wi, wo, F::splat(eta), F::splat(1.0 / eta))
+    }
+
+    /// The same where the index varies.
+    #[inline(always)]
+    pub(super) fn between_lanes(wi: Vec3<F>, wo: Vec3<F>, eta: F) -> Self {
+        Self::between_either_way(wi, wo, eta, F::one() / eta)
+    }
+
+    /// The same with the index for light from outside and from inside.
+    #[inline(always)]
+    fn between_either_way(wi: Vec3<F>, wo: Vec3<F>, inward: F, outward: F) -> Self {
         let (zero, one) = (F::zero(), F::one());
         let reflection = zero.lt(wi.z * wo.z);
-        let relative = F::select(zero.lt(wi.z), F::splat(eta), F::splat(1.0 / eta));
+        let relative = F::select(zero.lt(wi.z), inward, outward);
         let eta = F::select(reflection, one, relative);
         let half = (wi + wo * eta).normalize_or_zero();
         let m = Vec3::select(half.z.lt(zero), -half, half);

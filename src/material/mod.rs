@@ -22,6 +22,7 @@ mod twosided;
 
 mod block;
 mod disney;
+mod dispersion;
 mod fresnel;
 mod ior;
 mod microfacet;

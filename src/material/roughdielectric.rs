@@ -2,6 +2,7 @@
 //! refraction through rough surfaces*, 2007). Parameters of the media as for a dielectric, of the
 //! roughness as for a roughconductor.
 
+use super::dispersion::Dispersion;
 use super::microfacet::{self, Distribution, Interface, Roughness};
 use super::{
     BlockBsdf, Bsdf, BsdfSamples, BsdfValues, Lobes, dielectric, fresnel, ior, single_face,
@@ -20,6 +21,8 @@ pub struct RoughDielectric<C: ColorModel> {
     roughness: Roughness,
     /// Index of refraction, inside over outside.
     eta: f32,
+    /// The same over wavelength, where it depends on that.
+    dispersion: Option<Box<Dispersion<C>>>,
     specular_reflectance: Texture<C>,
     specular_transmittance: Texture<C>,
 }
@@ -28,7 +31,7 @@ impl<C: ColorModel> RoughDielectric<C> {
     pub(super) const PLUGIN: Plugin = Plugin {
         about: "rough glass",
         properties: &[
-            &super::ior::dielectric("bk7"),
+            &super::ior::dispersive("bk7"),
             super::microfacet::STRETCHED,
             dielectric::FACTORS,
         ],
@@ -39,7 +42,8 @@ impl<C: ColorModel> RoughDielectric<C> {
             dielectric::factors(properties, palettes)?;
         Ok(Self {
             roughness: Roughness::build(properties, &palettes.numbers)?,
-            eta: ior::relative_and_different(properties)?,
+            eta: ior::different(properties, ior::relative_of_yellow(properties)?)?,
+            dispersion: Dispersion::build(properties, palettes)?,
             specular_reflectance,
             specular_transmittance,
         })
@@ -77,6 +81,9 @@ impl<C: ColorModel> BlockBsdf<C> for RoughDielectric<C> {
         wo: Vec3<F>,
         w: &[C::Wavelengths],
     ) -> BsdfValues<F, C::Columns<F>> {
+        if let Some(dispersion) = &self.dispersion {
+            return self.eval_dispersed(dispersion, at, wi, wo, w);
+        }
         let one = F::one();
         let interface = Interface::between(wi, wo, self.eta);
         let (m, reflection) = (interface.m, interface.reflection);
@@ -112,7 +119,16 @@ impl<C: ColorModel> BlockBsdf<C> for RoughDielectric<C> {
     ) -> BsdfSamples<F, C::Columns<F>> {
         let distribution = drawn_from(self.roughness.at_lanes(at), wi);
         let m = distribution.sample(microfacet::in_front(wi), u2);
-        let boundary = fresnel::dielectric(wi.dot(m), self.eta);
+        let (boundary, u1) = match &self.dispersion {
+            None => (fresnel::dielectric(wi.dot(m), self.eta), u1),
+            Some(dispersion) => {
+                let index = dispersion.chosen(dispersion.indices::<F>(w), dispersion.choose(u1));
+                (
+                    fresnel::dielectric_lanes(wi.dot(m), index),
+                    dispersion.rest(u1),
+                )
+            }
+        };
         let reflected = u1.lt(boundary.reflectance);
         let wo = Vec3::select(
             reflected,
@@ -126,6 +142,50 @@ impl<C: ColorModel> BlockBsdf<C> for RoughDielectric<C> {
         BsdfSamples {
             drawn: samples.drawn & fits,
             ..samples
+        }
+    }
+}
+
+impl<C: ColorModel> RoughDielectric<C> {
+    /// The values where each wavelength has its own index. The density is that of drawing with one of them, chosen evenly.
+    #[inline(always)]
+    fn eval_dispersed<F: Lanes>(
+        &self,
+        dispersion: &Dispersion<C>,
+        at: &Points<'_, F>,
+        wi: Vec3<F>,
+        wo: Vec3<F>,
+        w: &[C::Wavelengths],
+    ) -> BsdfValues<F, C::Columns<F>> {
+        let (zero, one) = (F::zero(), F::one());
+        let distribution = self.roughness.at_lanes(at);
+        let drawn_from = drawn_from(distribution, wi);
+        let front = microfacet::in_front(wi);
+        let indices = dispersion.indices::<F>(w);
+        let (mut values, mut densities) = (C::Columns::<F>::zero(), C::Columns::<F>::zero());
+        for channel in 0..C::Columns::<F>::CHANNELS {
+            let index = indices[channel];
+            let interface = Interface::between_lanes(wi, wo, index);
+            let m = interface.m;
+            let cos = wi.dot(m);
+            let reflectance = fresnel::dielectric_lanes(cos, index).reflectance;
+            let dg = distribution.eval(m) * distribution.g(wi, wo, m);
+            let share = F::select(interface.reflection, reflectance, one - reflectance);
+            let radiance = one / (interface.eta * interface.eta);
+            let value = share * dg * radiance * interface.jacobian * (cos / wi.z).abs();
+            let density = drawn_from.pdf(front, m) * share * interface.jacobian;
+            let there = interface.found & zero.lt(dg);
+            values = values.with(channel, F::select(there, value, zero));
+            densities = densities.with(channel, F::select(there, density, zero));
+        }
+        let factor = C::Columns::<F>::select(
+            zero.lt(wi.z * wo.z),
+            self.specular_reflectance.eval_lanes(at, w),
+            self.specular_transmittance.eval_lanes(at, w),
+        );
+        BsdfValues {
+            value: factor * values,
+            pdf: dispersion.mean(densities),
         }
     }
 }

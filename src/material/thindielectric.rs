@@ -3,8 +3,9 @@
 //! on. `int_ior` is bk7 glass and `ext_ior` air by default; `specular_reflectance` and
 //! `specular_transmittance` (1) multiply.
 
+use super::dispersion::Dispersion;
 use super::{BlockBsdf, Bsdf, BsdfSamples, Lobes, dielectric, fresnel, ior, single_face};
-use crate::color::ColorModel;
+use crate::color::{ColorModel, Spectra as _};
 use crate::description::Properties;
 use crate::description::declared::Plugin;
 use crate::error::Result;
@@ -17,6 +18,8 @@ use crate::texture::{Palettes, Texture};
 pub struct ThinDielectric<C: ColorModel> {
     /// Index of refraction, inside over outside.
     eta: f32,
+    /// The same over wavelength, where it depends on that.
+    dispersion: Option<Box<Dispersion<C>>>,
     specular_reflectance: Texture<C>,
     specular_transmittance: Texture<C>,
 }
@@ -24,14 +27,15 @@ pub struct ThinDielectric<C: ColorModel> {
 impl<C: ColorModel> ThinDielectric<C> {
     pub(super) const PLUGIN: Plugin = Plugin {
         about: "a thin pane of glass",
-        properties: &[&super::ior::dielectric("bk7"), dielectric::FACTORS],
+        properties: &[&super::ior::dispersive("bk7"), dielectric::FACTORS],
     };
 
     pub(super) fn build(properties: &Properties<'_>, palettes: &Palettes<C>) -> Result<Self> {
         let [specular_reflectance, specular_transmittance] =
             dielectric::factors(properties, palettes)?;
         Ok(Self {
-            eta: ior::relative(properties)?,
+            eta: ior::relative_of_yellow(properties)?,
+            dispersion: Dispersion::build(properties, palettes)?,
             specular_reflectance,
             specular_transmittance,
         })
@@ -59,6 +63,9 @@ impl<C: ColorModel> BlockBsdf<C> for ThinDielectric<C> {
         _u2: Vec2<F>,
         w: &[C::Wavelengths],
     ) -> BsdfSamples<F, C::Columns<F>> {
+        if let Some(dispersion) = &self.dispersion {
+            return self.sample_dispersed(dispersion, at, wi, u1, w);
+        }
         let once = fresnel::dielectric(wi.z.abs(), self.eta).reflectance;
         let reflectance = (once + once) / (F::one() + once);
         let reflected = BsdfSamples::delta(
@@ -70,5 +77,38 @@ impl<C: ColorModel> BlockBsdf<C> for ThinDielectric<C> {
         let transmittance = self.specular_transmittance.eval_lanes(at, w);
         let passing = BsdfSamples::passing(wi, F::one() - reflectance, transmittance);
         BsdfSamples::select(u1.lt(reflectance), reflected, passing)
+    }
+}
+
+impl<C: ColorModel> ThinDielectric<C> {
+    /// Samples where each wavelength has its own share of what is reflected.
+    #[inline(always)]
+    fn sample_dispersed<F: Lanes>(
+        &self,
+        dispersion: &Dispersion<C>,
+        at: &Points<'_, F>,
+        wi: Vec3<F>,
+        u1: F,
+        w: &[C::Wavelengths],
+    ) -> BsdfSamples<F, C::Columns<F>> {
+        let one = F::one();
+        let indices = dispersion.indices::<F>(w);
+        let (mut reflectances, mut rests) = (C::Columns::<F>::zero(), C::Columns::<F>::zero());
+        for channel in 0..C::Columns::<F>::CHANNELS {
+            let once = fresnel::dielectric_lanes(wi.z.abs(), indices[channel]).reflectance;
+            let reflectance = (once + once) / (one + once);
+            reflectances = reflectances.with(channel, reflectance);
+            rests = rests.with(channel, one - reflectance);
+        }
+        let mean = dispersion.mean(reflectances);
+        let reflected = BsdfSamples::delta(
+            F::Mask::splat(true),
+            fresnel::mirror(wi),
+            self.specular_reflectance.eval_lanes(at, w) * reflectances * (one / mean),
+            mean,
+        );
+        let transmittance = self.specular_transmittance.eval_lanes(at, w) * rests;
+        let passing = BsdfSamples::passing(wi, one - mean, transmittance * (one / (one - mean)));
+        BsdfSamples::select(u1.lt(mean), reflected, passing)
     }
 }

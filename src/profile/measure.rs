@@ -310,7 +310,7 @@ impl Rounds<'_> {
         Options {
             threads: NonZeroUsize::new(setting.threads),
             pinned: true,
-            colors: setting.bands.map_or(Colors::Rgb, Colors::Bands),
+            colors: setting.bands.map_or(Colors::Rgb, Colors::bands),
             method: setting.method,
             // The same for all, whatever the rays that are to come.
             build: Some(Build::Medium),

@@ -28,7 +28,7 @@ impl Session {
                 progress,
                 traced: false,
             };
-            Measure(ask).run_in(options.colors)
+            Measure(ask).run_in(description, options)
         })?;
         Ok(facts.warnings)
     }

@@ -102,8 +102,11 @@ impl Fingerprint {
             files.push(FileHash::new(path, Some(hash)));
         }
         let bands = match options.colors {
-            Colors::Rgb => 0,
-            Colors::Bands(n) => n,
+            Colors::Rgb => "0".to_owned(),
+            Colors::Bands { count, range } => match range {
+                None => format!("{count}"),
+                Some([first, last]) => format!("{count} from {first} to {last} nm"),
+            },
         };
         let settings = format!(
             "seed {} bands {bands} tile {TILE} pass {PASS} block {BLOCK} {:?}",

@@ -77,7 +77,7 @@ impl Session {
                 description,
                 sensor: *id,
             };
-            look.run_in(options.colors).ok()
+            look.run_in(description, options).ok()
         };
         let bounds = contents.bounds;
         let corners = [bounds.min, bounds.max].map(|corner| corner.to_array());

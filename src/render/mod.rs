@@ -10,6 +10,7 @@ mod bare;
 mod black;
 mod check;
 mod checkpoint;
+mod colors;
 mod fingerprint;
 mod heat;
 mod info;

@@ -10,13 +10,25 @@ use crate::description::{Description, Kind, NodeId, Value};
 use crate::sensor::Window;
 
 /// Which colour model a render uses.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Colors {
     /// Linear BT.709.
     #[default]
     Rgb,
-    /// So many spectral bands over 360–830 nm, 1 to 32.
-    Bands(usize),
+    /// Spectral bands.
+    Bands {
+        /// How many, 1 to [`MAX_BANDS`](crate::color::MAX_BANDS).
+        count: usize,
+        /// The first and the last wavelength in nm; where absent the visible range, or that of the film's responses.
+        range: Option<[f32; 2]>,
+    },
+}
+
+impl Colors {
+    /// So many bands over the range where there is something to see.
+    pub fn bands(count: usize) -> Self {
+        Self::Bands { count, range: None }
+    }
 }
 
 /// Where and how often a render is kept.

@@ -133,7 +133,10 @@ pub(super) fn examine(description: &Description) -> Findings {
                 Value::Object(child) => Some(description.node(child)),
                 _ => None,
             };
-            let nested = child.and_then(|child| plugin.nested(child.kind()));
+            let nested = match property.value {
+                Value::Spectrum(_) => plugin.nested(Kind::Spectrum),
+                _ => child.and_then(|child| plugin.nested(child.kind())),
+            };
             let Some(row) = plugin.row(&property.name).or(nested) else {
                 problems.push((id, undeclared(&node, plugin, property, child.as_ref())));
                 continue;
@@ -323,13 +326,16 @@ mod tests {
                 "integer",
                 &format!("{}", least.max(2.0).min(row.range.most)),
             ),
-            Takes::Float | Takes::Color | Takes::Texture | Takes::Number | Takes::Substance => {
-                match (row.takes, name) {
-                    (Takes::Color, "color") => tagged("rgb", "0.5"),
-                    (_, "wavelength_max") => tagged("float", "700"),
-                    _ => tagged("float", &number.to_string()),
-                }
-            }
+            Takes::Float
+            | Takes::Color
+            | Takes::Texture
+            | Takes::Number
+            | Takes::Substance
+            | Takes::Index => match (row.takes, name) {
+                (Takes::Color, "color") => tagged("rgb", "0.5"),
+                (_, "wavelength_max") => tagged("float", "700"),
+                _ => tagged("float", &number.to_string()),
+            },
             Takes::Choice(choices) => tagged("string", choices[choices.len() - 1]),
             Takes::String => tagged(
                 "string",
@@ -338,6 +344,7 @@ mod tests {
                     "aovs" => "a:depth",
                     "layers" => "terms",
                     "focal_length" => "35mm",
+                    "b" | "c" => "0.5, 0.01",
                     "wavelengths" => "400, 500",
                     "uv" => "0 0 1 0 0 1",
                     "material" => "Au",
@@ -367,6 +374,7 @@ mod tests {
             (Kind::Shape, "instance") => "<shape type='shapegroup'><shape type='sphere'/></shape>",
             (Kind::Shape, "group" | "shapegroup") => "<shape type='sphere'/>",
             (Kind::Integrator, "moment") => "<integrator type='path'/>",
+            (Kind::Film, "specfilm") => "<spectrum name='red' value='550:0, 600:1, 650:0'/>",
             _ => "",
         }
     }

@@ -7,9 +7,10 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use super::black;
+use super::colors::Model;
 use super::fingerprint::{self, Contents, Fingerprint};
 use super::memory::{self, Estimate};
-use super::options::{Colors, Options};
+use super::options::Options;
 use super::plan::Completed;
 use super::plugins;
 use super::progress::{Phase, Progress};
@@ -24,7 +25,7 @@ use crate::integrator::{self, Estimator, Footprint, Integrator};
 use crate::mesh::ReadMesh;
 use crate::sampler::Sampler;
 use crate::scene::{self, Assets, Scene};
-use crate::sensor::{Film, Sensor};
+use crate::sensor::{Coordinates, Film, Sensor};
 use crate::shape::Bounds;
 
 /// A scene in memory, and what it was made from.
@@ -58,10 +59,10 @@ impl Kept {
 }
 
 /// What two renders must agree in to share a scene.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 struct Key {
     scene: String,
-    colors: Colors,
+    model: Model,
     method: Method,
     build: Option<Build>,
     /// The shutter's times, where anything moves.
@@ -369,7 +370,7 @@ pub(super) fn prepare<'k, C: ColorModel>(ask: &'k mut Ask<'_>, color: C) -> Resu
     let view = sensor.and_then(|sensor| problems.take(view::<C>(description, sensor)));
     let view = view.filter(|view| {
         let layout = layout(&color, &view.integrator);
-        let fit = image::check_channels(layout.names())
+        let fit = image::check_channels(&written(&view.film, &layout))
             .map_err(|error| integrator_at(description, error));
         problems.take(fit).is_some()
     });
@@ -386,7 +387,7 @@ pub(super) fn prepare<'k, C: ColorModel>(ask: &'k mut Ask<'_>, color: C) -> Resu
     let film = share.film;
     let key = Key {
         scene: fingerprint::scene_key(description),
-        colors: options.colors,
+        model: Model::of(description, options)?,
         method: ask.method(),
         build: options.build,
         shutter: description
@@ -449,6 +450,15 @@ fn integrator_at(description: &Description, error: Error) -> Error {
     match description.root().children(Kind::Integrator).first() {
         Some(integrator) => error.at(integrator.location()),
         None => error,
+    }
+}
+
+/// The names of the channels that stand beside each other: those of samples, without the red, green and blue that a film
+/// does not write where its own channels are called so.
+fn written(film: &Film, layout: &Layout) -> Vec<String> {
+    match film.pixel_format.colors {
+        Coordinates::None => layout.names()[layout.others()].to_vec(),
+        _ => layout.names().to_vec(),
     }
 }
 
@@ -533,6 +543,13 @@ impl<C: ColorModel> Job<'_, C> {
             .with("seed", i64::try_from(report.seed).unwrap_or(i64::MAX))
             .with("world_to_camera", to_camera)
             .with("world_to_ndc", self.view.sensor.projection() * to_camera);
+        // Fichet, Pacanowski and Wilkie 2021, section 4.
+        let bands = self.scene.color().channels();
+        let metadata = match bands.iter().any(|name| name.starts_with("S0.")) {
+            true => (metadata.with("spectralLayoutVersion", "1.0"))
+                .with("emissiveUnits", "W.m^-2.sr^-1"),
+            false => metadata,
+        };
         match &report.adaptive {
             None => metadata,
             Some(adaptive) => metadata

@@ -3,21 +3,23 @@
 //! another takes the place of the one before, so that one is in memory at a time.
 
 use std::num::NonZeroUsize;
+use std::sync::Arc;
 
 use rayon::ThreadPool;
 
 use super::adaptive::{self, AdaptiveReport};
 use super::black;
 use super::checkpoint::Keeper;
+use super::colors::Model;
 use super::heat::{self, Heat};
-use super::options::{Adaptive, Colors, Options};
+use super::options::{Adaptive, Options};
 use super::pinned;
 use super::plan::Completed;
 use super::prepare::{self, Ask, Facts, Job, Shelf};
 use super::progress::Progress;
 use super::uniform;
 use super::{Rendered, timed};
-use crate::color::{Bands, ColorModel, Rgb};
+use crate::color::{Bands, ColorModel, Comb, MAX_BANDS, Response, Rgb};
 use crate::description::Description;
 use crate::error::{Error, Result};
 use crate::film::{Accumulator, Tally};
@@ -49,18 +51,21 @@ pub(super) trait Task: Sized {
     fn run<C: ColorModel>(self, color: C) -> Result<Self::Output>;
 
     /// Does it in the model that is asked for.
-    fn run_in(self, colors: Colors) -> Result<Self::Output> {
-        match colors {
-            Colors::Rgb => self.run(Rgb),
-            Colors::Bands(n @ 1..=8) => self.run(bands::<8>(n)?),
-            Colors::Bands(n @ 9..=16) => self.run(bands::<16>(n)?),
-            Colors::Bands(n) => self.run(bands::<32>(n)?),
+    fn run_in(self, description: &Description, options: &Options) -> Result<Self::Output> {
+        match Model::of(description, options)? {
+            Model::Rgb => self.run(Rgb),
+            Model::Bands(comb, responses) => match comb.count() {
+                ..=8 => self.run(bands::<8>(comb, responses)),
+                9..=16 => self.run(bands::<16>(comb, responses)),
+                17..=32 => self.run(bands::<32>(comb, responses)),
+                _ => self.run(bands::<MAX_BANDS>(comb, responses)),
+            },
         }
     }
 }
 
-fn bands<const N: usize>(count: usize) -> Result<Bands<N>> {
-    Bands::new(count).ok_or_else(|| Error::input(format!("{count} bands; 1 to 32 are possible")))
+fn bands<const N: usize>(comb: Comb, responses: Arc<[Response]>) -> Bands<N> {
+    Bands::new(comb, responses).expect("so many bands fit")
 }
 
 /// Makes sure that the scene is in memory and tells of it.
@@ -236,7 +241,7 @@ impl Session {
                 progress,
                 traced: true,
             };
-            Render(ask).run_in(options.colors)
+            Render(ask).run_in(description, options)
         })
     }
 
@@ -258,7 +263,7 @@ impl Session {
                 progress,
                 traced: true,
             };
-            Warm(ask).run_in(options.colors)
+            Warm(ask).run_in(description, options)
         })
     }
 
@@ -290,7 +295,7 @@ impl Session {
                 progress,
                 traced: true,
             };
-            Measure(ask).run_in(options.colors)
+            Measure(ask).run_in(description, options)
         })
     }
 

@@ -201,7 +201,7 @@ fn a_checkpoint_of_another_render_is_refused_and_says_what_is_another() {
     };
     assert!(refusal(&scene, &seed).contains("a setting"));
     let bands = Options {
-        colors: Colors::Bands(3),
+        colors: Colors::bands(3),
         ..options.clone()
     };
     assert!(refusal(&scene, &bands).contains("a setting"));

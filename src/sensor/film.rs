@@ -1,11 +1,19 @@
 //! `hdrfilm`: size, crop window, pixel format, reconstruction filter, and whether samples beyond the edges count
-//! (`sample_border`); plain settings, for the sums themselves are kept by `render`.
+//! (`sample_border`); plain settings, for the sums themselves are kept by `render`. `specfilm` has a channel for each
+//! nested spectrum, named as that is: the integral over wavelength of radiance times that response. It is rendered in
+//! bands; R, G and B stand beside its channels unless one of these is called so.
 
-use crate::description::declared::{Plugin, Plugins, boolean, choice, integer, nested, string};
+use std::sync::Arc;
+
+use crate::color::{Bands, Response, Role};
+use crate::description::declared::{
+    Plugin, Plugins, Row, boolean, choice, integer, nested, string,
+};
 use crate::description::{Kind, Properties};
 use crate::error::{Error, Result};
 use crate::family;
 use crate::filter::Filter;
+use crate::texture::Palette;
 
 /// A rectangle of pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,6 +65,8 @@ pub enum Coordinates {
     Luminance,
     /// X, Y, Z: the CIE's of 1931.
     Xyz,
+    /// Nothing beside other channels.
+    None,
 }
 
 impl Coordinates {
@@ -66,6 +76,7 @@ impl Coordinates {
             Self::Rgb => &["R", "G", "B"],
             Self::Luminance => &["Y"],
             Self::Xyz => &["X", "Y", "Z"],
+            Self::None => &[],
         }
     }
 }
@@ -103,6 +114,15 @@ impl PixelFormat {
         Self { colors, alpha }
     }
 
+    /// Red, green and blue, unless one of a film's own channels is called so.
+    fn beside(responses: &[Response]) -> Self {
+        let taken = |name: &str| matches!(name, "R" | "G" | "B" | "A");
+        match responses.iter().any(|response| taken(&response.name)) {
+            true => Self::new(Coordinates::None, false),
+            false => Self::RGB,
+        }
+    }
+
     fn build(properties: &Properties<'_>) -> Result<Self> {
         let name = properties.choice("pixel_format")?;
         let format = Self::NAMED.iter().find(|(known, _)| *known == name);
@@ -125,6 +145,8 @@ pub struct Film {
     pub filter: Filter,
     /// Whether samples that lie beyond the film's edges count as far as the filter reaches.
     pub sample_border: bool,
+    /// The channels of a `specfilm`; none of another film.
+    pub responses: Arc<[Response]>,
 }
 
 impl Default for Film {
@@ -144,6 +166,7 @@ impl Default for Film {
             pixel_format: PixelFormat::RGB,
             filter: Filter::default(),
             sample_border: false,
+            responses: Arc::default(),
         }
     }
 }
@@ -152,38 +175,63 @@ impl Default for Film {
 const MAX_SIDE: f64 = 65536.0;
 
 /// The film plugins.
-pub const FILMS: Plugins = &[("hdrfilm", &HDRFILM)];
+pub const FILMS: Plugins = &[("hdrfilm", &HDRFILM), ("specfilm", &SPECFILM)];
 
 const HDRFILM: Plugin = Plugin {
     about: "linear pixels of unlimited range; what is written follows from the output's name",
-    properties: &[&[
-        integer("width", 768, "pixels across the full film").between(1.0, MAX_SIDE),
-        integer("height", 576, "pixels down the full film").between(1.0, MAX_SIDE),
-        integer("crop_offset_x", 0, "left edge of what is rendered").between(0.0, MAX_SIDE),
-        integer("crop_offset_y", 0, "upper edge of what is rendered").between(0.0, MAX_SIDE),
-        integer("crop_width", 768, "pixels across what is rendered")
-            .between(1.0, MAX_SIDE)
-            .absent("width"),
-        integer("crop_height", 576, "pixels down what is rendered")
-            .between(1.0, MAX_SIDE)
-            .absent("height"),
-        choice(
-            "pixel_format",
-            &["rgb", "rgba", "luminance", "luminance_alpha", "xyz", "xyza"],
-            "which channels the image has",
-        ),
-        boolean(
-            "sample_border",
-            false,
-            "whether samples beyond the edge count there too",
-        ),
-        string("file_format", "openexr", "how Mitsuba writes its file").without_effect(),
-        string("component_format", "float16", "how Mitsuba writes its file").without_effect(),
-        boolean("banner", true, "how Mitsuba writes its file").without_effect(),
-        boolean("compensate", false, "how Mitsuba adds samples up").without_effect(),
-        nested(Kind::Filter, "how samples reach the pixels around them"),
-    ]],
+    properties: &[
+        COMMON,
+        &[
+            choice(
+                "pixel_format",
+                &["rgb", "rgba", "luminance", "luminance_alpha", "xyz", "xyza"],
+                "which channels the image has",
+            ),
+            string("file_format", "openexr", "how Mitsuba writes its file").without_effect(),
+            string("component_format", "float16", "how Mitsuba writes its file").without_effect(),
+            boolean("banner", true, "how Mitsuba writes its file").without_effect(),
+        ],
+    ],
 };
+
+const SPECFILM: Plugin = Plugin {
+    about: "a channel for each response curve; rendered in bands",
+    properties: &[
+        COMMON,
+        &[
+            string("component_format", "float32", "how Mitsuba writes its file").without_effect(),
+            nested(
+                Kind::Spectrum,
+                "a response, one or more; their names are the channels'",
+            ),
+            nested(
+                Kind::Texture,
+                "a response, one or more; their names are the channels'",
+            ),
+        ],
+    ],
+};
+
+/// What all films read.
+const COMMON: &[Row] = &[
+    integer("width", 768, "pixels across the full film").between(1.0, MAX_SIDE),
+    integer("height", 576, "pixels down the full film").between(1.0, MAX_SIDE),
+    integer("crop_offset_x", 0, "left edge of what is rendered").between(0.0, MAX_SIDE),
+    integer("crop_offset_y", 0, "upper edge of what is rendered").between(0.0, MAX_SIDE),
+    integer("crop_width", 768, "pixels across what is rendered")
+        .between(1.0, MAX_SIDE)
+        .absent("width"),
+    integer("crop_height", 576, "pixels down what is rendered")
+        .between(1.0, MAX_SIDE)
+        .absent("height"),
+    boolean(
+        "sample_border",
+        false,
+        "whether samples beyond the edge count there too",
+    ),
+    boolean("compensate", false, "how Mitsuba adds samples up").without_effect(),
+    nested(Kind::Filter, "how samples reach the pixels around them"),
+];
 
 /// The most pixels of a crop.
 const MAX_PIXELS: u64 = 1 << 28;
@@ -274,7 +322,14 @@ impl Film {
                 .error("width", message)
                 .help("render it in crops"));
         }
-        let pixel_format = PixelFormat::build(properties)?;
+        let responses = match properties.plugin() {
+            "specfilm" => responses(properties)?,
+            _ => Vec::new(),
+        };
+        let pixel_format = match properties.plugin() {
+            "specfilm" => PixelFormat::beside(&responses),
+            _ => PixelFormat::build(properties)?,
+        };
         let filter = match properties.child(Kind::Filter)? {
             Some(child) => Filter::build(&child, &())?,
             None => Filter::default(),
@@ -286,6 +341,41 @@ impl Film {
             pixel_format,
             filter,
             sample_border: properties.boolean("sample_border")?,
+            responses: responses.into(),
         })
     }
+}
+
+/// The response curves of a `specfilm`, in file order.
+fn responses(properties: &Properties<'_>) -> Result<Vec<Response>> {
+    let visible = Bands::<1>::visible(1).expect("one band is possible");
+    let palette = Palette::new(visible);
+    let mut responses: Vec<Response> = Vec::new();
+    for property in properties.all() {
+        let Some(spectrum) = palette.spectrum(properties, property, Role::Quantity)? else {
+            continue;
+        };
+        let located = |message| Error::input(message).at(&property.location);
+        if spectrum.least() < 0.0 {
+            return Err(located(format!(
+                "a response cannot be negative, and {:?} is",
+                property.name
+            )));
+        }
+        let id = properties.held(property).and_then(|child| child.id());
+        let name = match (property.name.as_str(), id) {
+            ("", Some(id)) => id.to_owned(),
+            ("", None) => format!("response_{}", responses.len()),
+            (name, _) => name.to_owned(),
+        };
+        if responses.iter().any(|other| other.name == name) {
+            return Err(located(format!("two responses are called {name:?}")));
+        }
+        responses.push(Response { name, spectrum });
+    }
+    if responses.is_empty() {
+        let error = properties.error("", "specfilm needs a response curve for each channel");
+        return Err(error.help(r#"such as <spectrum name="red" value="550:0, 600:1, 650:0"/>"#));
+    }
+    Ok(responses)
 }

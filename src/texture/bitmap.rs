@@ -1,6 +1,8 @@
 //! `bitmap`: an image file over texture coordinates, (0, 0) at the upper left corner of the image and v
 //! downwards. `filter_type` is bilinear or nearest, `wrap_mode` repeat, mirror or clamp; 8- and 16-bit
-//! files are decoded from sRGB unless `raw` says that they hold numbers; alpha is dropped.
+//! files are decoded from sRGB unless `raw` says that they hold numbers; alpha is dropped. In bands, as in Mitsuba's
+//! spectral variants, colours become the spectra of reflectances whatever they stand for: as light they are clamped to
+//! [0, 1] and have no illuminant, unless a `d65` holds the bitmap.
 
 use std::sync::Arc;
 
@@ -127,7 +129,7 @@ impl<C: ColorModel> Bitmap<C> {
                     let [width, height] = texels.size;
                     let all = width * height;
                     let message = format!(
-                        "{clamped} of {all} texels reflect less than 0 or more than 1, and are clamped"
+                        "{clamped} of {all} texels are below 0 or above 1, and are clamped to that"
                     );
                     palette.warn(properties.error("filename", message));
                 }
@@ -226,10 +228,15 @@ fn load<C: ColorModel>(
 ) -> Result<Loaded<C>> {
     let picture = Picture::read(path, raw, budget)?;
     let size = picture.size;
-    let role = if raw && palette.role == Role::Reflectance {
-        Role::Quantity
-    } else {
-        palette.role
+    let role = match palette.role {
+        Role::Reflectance if raw => Role::Quantity,
+        Role::Reflectance => Role::Reflectance,
+        // Mitsuba's spectral variants make reflectances of all colours, and no spectra of plain numbers and of greys.
+        _ if palette.color.upsamples() => match raw || picture.grey {
+            true => Role::Quantity,
+            false => Role::Reflectance,
+        },
+        role => role,
     };
     let fits = |rgb: [f32; 3]| rgb.iter().all(|v| (0.0..=1.0).contains(v));
     let clamped = match role {

@@ -37,8 +37,9 @@ impl<C: ColorModel> Checkerboard<C> {
     };
 
     pub(super) fn build(properties: &Properties<'_>, palette: &Palette<C>) -> Result<Self> {
-        let color0 = palette.texture(properties, "color0", palette.role)?;
-        let color1 = palette.texture(properties, "color1", palette.role)?;
+        let role = palette.inner_role();
+        let color0 = palette.texture(properties, "color0", role)?;
+        let color1 = palette.texture(properties, "color1", role)?;
         let numbers = TypeId::of::<C>() == TypeId::of::<Mono>();
         Ok(Self {
             colors: Box::new(if numbers {

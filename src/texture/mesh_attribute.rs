@@ -39,7 +39,11 @@ impl<C: ColorModel> MeshAttribute<C> {
             name: name.to_owned(),
             scale: properties.float("scale")? as f32,
             color: palette.color.clone(),
-            role: palette.role,
+            // A spectrum of what the mesh says, without an illuminant and clamped, as Mitsuba has it.
+            role: match palette.inner_role() {
+                Role::Quantity if palette.color.upsamples() => Role::Reflectance,
+                role => role,
+            },
         })
     }
 }
@@ -176,7 +180,7 @@ mod tests {
     /// Mitsuba 3.9.1 `scalar_spectral`: a `diffuse` of (2, 0.5, 0.2) or (1, 0.5, 0.2) under a constant sky.
     #[test]
     fn a_reflectance_becomes_a_spectrum_before_it_is_scaled() {
-        let bands = Bands::<16>::new(16).expect("16 bands fit");
+        let bands = Bands::<16>::visible(16).expect("16 bands fit");
         let sky = bands
             .store(&Color::Grey(1.0), Role::Emission)
             .expect("light");
@@ -184,7 +188,7 @@ mod tests {
             let mut mean = [0.0; 3];
             for i in 0..200_u8 {
                 let wavelengths = bands.wavelengths(|| (f32::from(i) + 0.5) / 200.0);
-                let value = reflectance(bands, [first, 0.5, 0.2], 2.0, &wavelengths)
+                let value = reflectance(bands.clone(), [first, 0.5, 0.2], 2.0, &wavelengths)
                     * Bands::evaluate(&sky, &wavelengths);
                 let mut out = [0.0; 19];
                 bands.develop(&value, &wavelengths, &mut out);

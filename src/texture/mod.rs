@@ -3,13 +3,16 @@
 
 mod bitmap;
 mod blackbody;
+mod cauchy;
 mod checkerboard;
 mod d65;
+mod glass;
 mod irregular;
 mod mesh_attribute;
 mod picture;
 mod rawconstant;
 mod regular;
+mod sellmeier;
 mod srgb;
 mod uniform;
 mod zoneplate;
@@ -59,12 +62,15 @@ family! {
     pub enum Texture<C>: Pattern, context Palette<C> {
         "bitmap" => Bitmap(bitmap::Bitmap<C>),
         "blackbody" => Blackbody(blackbody::Blackbody<C>),
+        "cauchy" => Cauchy(cauchy::Cauchy<C>),
         "checkerboard" => Checkerboard(checkerboard::Checkerboard<C>),
         "d65" => D65(d65::D65<C>),
+        "glass" => Glass(glass::Glass<C>),
         "irregular" => Irregular(irregular::Irregular<C>),
         "mesh_attribute" => MeshAttribute(mesh_attribute::MeshAttribute<C>),
         "rawconstant" => RawConstant(rawconstant::RawConstant<C>),
         "regular" => Regular(regular::Regular<C>),
+        "sellmeier" => Sellmeier(sellmeier::Sellmeier<C>),
         "srgb" => Srgb(srgb::Srgb<C>),
         "uniform" => Uniform(uniform::Uniform<C>),
         "zoneplate" => ZonePlate(zoneplate::ZonePlate<C>),
@@ -220,6 +226,34 @@ impl<C: ColorModel> Palette<C> {
         Ok(Texture::Uniform(uniform::Uniform::new(stored)))
     }
 
+    /// The spectrum that a property of any name gives, if it gives one that is the same everywhere.
+    pub fn spectrum(
+        &self,
+        properties: &Properties<'_>,
+        property: &Property,
+        role: Role,
+    ) -> Result<Option<C::Stored>> {
+        match &property.value {
+            Value::Spectrum(_) => {
+                let color = color(property)?;
+                self.store(properties, &property.name, &color, role)
+                    .map(Some)
+            }
+            Value::Object(_) => {
+                let child = properties.held(property);
+                let spectral =
+                    |child: &Properties<'_>| matches!(child.kind(), Kind::Texture | Kind::Spectrum);
+                let Some(child) = child.filter(spectral) else {
+                    return Ok(None);
+                };
+                let texture = self.nested(&child, role)?;
+                let refused = || child.error("", "a response must be the same everywhere");
+                texture.constant().cloned().ok_or_else(refused).map(Some)
+            }
+            _ => Ok(None),
+        }
+    }
+
     /// The texture that a node describes; one that is the same everywhere becomes [`Texture::Uniform`].
     pub fn nested(&self, properties: &Properties<'_>, role: Role) -> Result<Texture<C>> {
         let texture = Texture::build(properties, &self.with_role(role))?;
@@ -233,7 +267,7 @@ impl<C: ColorModel> Palette<C> {
     fn store(
         &self,
         properties: &Properties<'_>,
-        name: &'static str,
+        name: &str,
         color: &Color,
         role: Role,
     ) -> Result<C::Stored> {
@@ -254,6 +288,20 @@ impl<C: ColorModel> Palette<C> {
             self.warn(properties.error("", message));
         }
         self.store(properties, "values", &Color::Curve(points), self.role)
+    }
+
+    /// The index of refraction of points (nm, value) that the node describes.
+    fn index(&self, properties: &Properties<'_>, points: Vec<(f64, f64)>) -> Result<C::Stored> {
+        self.store(properties, "", &Color::Curve(points), Role::Quantity)
+    }
+
+    /// What colours inside of a texture stand for. Of light that varies over a surface Mitsuba's spectral variants take
+    /// them without an illuminant.
+    fn inner_role(&self) -> Role {
+        match self.role {
+            Role::Emission if self.color.upsamples() => Role::Quantity,
+            role => role,
+        }
     }
 
     /// Refuses values below 0 of what is light.

@@ -15,6 +15,8 @@ pub struct Picture {
     pub size: [usize; 2],
     /// Row by row from the top.
     pub pixels: Pixels,
+    /// Whether the file has greys, and no colours.
+    pub grey: bool,
     account: Account,
 }
 
@@ -46,6 +48,7 @@ impl Picture {
         let linear = |value| finite(decode(value));
         Ok(Self {
             size,
+            grey: rgb[0] == rgb[1],
             pixels: match codes {
                 Some(codes) => {
                     let values = std::array::from_fn(|code| decode(of_code(code as u8)));

@@ -24,8 +24,8 @@ fn built<C: ColorModel>(spectrum: &str, palette: &Palette<C>, role: Role) -> Res
 /// The RGB that paths in bands make of a spectrum as light, averaged over shifts of the comb.
 fn seen(spectrum: &str, role: Role) -> [f32; 3] {
     const SHIFTS: u16 = 200;
-    let bands = Bands::<16>::new(16).expect("16 bands fit");
-    let texture = built(spectrum, &Palette::new(bands), role).unwrap();
+    let bands = Bands::<16>::visible(16).expect("16 bands fit");
+    let texture = built(spectrum, &Palette::new(bands.clone()), role).unwrap();
     let mut sum = [0.0; 3];
     for i in 0..SHIFTS {
         let wavelengths = bands.wavelengths(|| (f32::from(i) + 0.5) / f32::from(SHIFTS));
@@ -224,9 +224,10 @@ fn every_texture<C: ColorModel>(color: &C) -> Vec<(&'static str, Texture<C>)> {
         "mesh_attribute" => "<string name='name' value='vertex_color'/>".to_owned(),
         "rawconstant" => "<float name='value' value='0.3'/>".to_owned(),
         "regular" => "<float name='wavelength_min' value='400'/><float name='wavelength_max' value='700'/><string name='values' value='0.1, 0.3'/>".to_owned(),
+        "sellmeier" => "<string name='b' value='1.04, 0.23'/><string name='c' value='0.006, 0.02'/>".to_owned(),
         "srgb" => "<rgb name='color' value='0.2, 0.4, 0.1'/>".to_owned(),
         "zoneplate" => "<float name='rings' value='2'/>".to_owned(),
-        "checkerboard" | "d65" | "uniform" => String::new(),
+        "cauchy" | "checkerboard" | "d65" | "glass" | "uniform" => String::new(),
         other => panic!("give {other} an example"),
     }
     };
@@ -274,7 +275,7 @@ fn every_texture_is_finite_changes_as_its_gradient_says_and_is_constant_where_it
 
 #[test]
 fn every_texture_is_made_in_every_colour_model() {
-    let bands = Bands::<8>::new(8).unwrap();
+    let bands = Bands::<8>::visible(8).unwrap();
     assert_eq!(every_texture(&bands).len(), Texture::<Rgb>::NAMES.len());
     assert_eq!(every_texture(&Mono).len(), Texture::<Rgb>::NAMES.len());
 }

@@ -40,10 +40,11 @@ impl<C: ColorModel> ZonePlate<C> {
 
     pub(super) fn build(properties: &Properties<'_>, palette: &Palette<C>) -> Result<Self> {
         let rings = properties.float("rings")?;
+        let role = palette.inner_role();
         Ok(Self {
             colors: Box::new([
-                palette.texture(properties, "color0", palette.role)?,
-                palette.texture(properties, "color1", palette.role)?,
+                palette.texture(properties, "color0", role)?,
+                palette.texture(properties, "color1", role)?,
             ]),
             rings: rings as f32,
             to_uv: to_uv(properties)?,

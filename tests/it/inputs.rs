@@ -475,7 +475,7 @@ const CASES: &[Case<'static>] = &[
         1,
         &["the same in every set"],
     ),
-    usage("33 bands", "--bands 33", 2, &["33"]),
+    usage("65 bands", "--bands 65", 2, &["65"]),
     usage("a definition without a value", "-D spp", 2, &["name=value"]),
     usage("threads without number", "--threads 0", 2, &["--threads"]),
     usage(

@@ -3,6 +3,7 @@
 
 mod support;
 
+mod bands;
 mod channels;
 mod cli;
 mod closed_form;

@@ -257,7 +257,7 @@ fn layers_add_up_to_the_image_in_rgb_and_in_bands() {
     ] {
         let text = spheres(&format!(r#"<string name="layers" value="{asked}"/>"#));
         let text = text.replace("</scene>", lamp);
-        for colors in [Colors::Rgb, Colors::Bands(5)] {
+        for colors in [Colors::Rgb, Colors::bands(5)] {
             let options = Options {
                 colors,
                 ..Options::default()

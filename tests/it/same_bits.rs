@@ -108,14 +108,15 @@ fn a_crop_equals_the_same_pixels_of_the_full_image() {
 #[test]
 fn every_number_of_bands_renders_the_box_finite_and_named() {
     for (count, last) in [
-        (1, "band.00_360.0-830.0nm"),
-        (8, "band.07_771.2-830.0nm"),
-        (11, "band.10_787.3-830.0nm"),
-        (16, "band.15_800.6-830.0nm"),
-        (32, "band.31_815.3-830.0nm"),
+        (1, "S0.595,000000nm"),
+        (8, "S0.800,625000nm"),
+        (11, "S0.808,636364nm"),
+        (16, "S0.815,312500nm"),
+        (32, "S0.822,656250nm"),
+        (64, "S0.826,328125nm"),
     ] {
         let options = Options {
-            colors: Colors::Bands(count),
+            colors: Colors::bands(count),
             ..Options::default()
         };
         let image = cornell(Overrides::default(), options);
@@ -172,7 +173,7 @@ fn bands_agree_with_rgb_on_grey_scenes() {
     const WHITE: [f64; 3] = [0.999_989, 0.999_697, 1.003_183];
     let rgb = means(Colors::Rgb, 0..6);
     for count in [8, 11, 16, 32] {
-        let bands = means(Colors::Bands(count), 6..12);
+        let bands = means(Colors::bands(count), 6..12);
         for c in 0..3 {
             let what = format!("{count} bands, channel {c}");
             let expected = Mean {

@@ -1,0 +1,78 @@
+//! A comb of wavelengths: a range cut into equal bands, of which a path carries one wavelength each, all moved inside
+//! their bands by one number.
+
+use super::cie;
+
+/// Equal bands side by side.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Comb {
+    count: usize,
+    first: f32,
+    last: f32,
+}
+
+/// The most bands that one path carries.
+pub const MAX_BANDS: usize = 64;
+
+/// The visible range, in nm, over which the observer's curves are known.
+pub const VISIBLE: [f32; 2] = [cie::FIRST, cie::LAST];
+
+impl Comb {
+    /// `count` bands from the first to the second wavelength of `range` (nm); `None` unless there are 1 to [`MAX_BANDS`]
+    /// and the range is positive and rises.
+    pub fn new(count: usize, [first, last]: [f32; 2]) -> Option<Self> {
+        let fits = (1..=MAX_BANDS).contains(&count);
+        let rises = first > 0.0 && last > first && last.is_finite();
+        (fits && rises).then_some(Self { count, first, last })
+    }
+
+    /// How many bands.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// A band's width in nm.
+    pub fn width(&self) -> f32 {
+        (self.last - self.first) / self.count as f32
+    }
+
+    /// The wavelength in nm at the fraction `u` of a band, in [0, 1).
+    #[inline]
+    pub fn wavelength(&self, band: usize, u: f32) -> f32 {
+        self.first + (band as f32 + u) * self.width()
+    }
+
+    /// The middle of a band in nm.
+    pub fn centre(&self, band: usize) -> f64 {
+        let (first, last) = (f64::from(self.first), f64::from(self.last));
+        first + (last - first) * (band as f64 + 0.5) / self.count as f64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bands_fill_their_range_side_by_side() {
+        let comb = Comb::new(8, VISIBLE).unwrap();
+        assert_eq!(comb.width(), 58.75);
+        assert_eq!(comb.wavelength(0, 0.0), 360.0);
+        assert_eq!(comb.wavelength(7, 1.0), 830.0);
+        assert_eq!(comb.centre(0), 389.375);
+    }
+
+    #[test]
+    fn what_is_no_comb_is_none() {
+        for (count, range) in [
+            (0, VISIBLE),
+            (65, VISIBLE),
+            (4, [500.0, 500.0]),
+            (4, [0.0, 500.0]),
+            (4, [500.0, f32::INFINITY]),
+            (4, [f32::NAN, 500.0]),
+        ] {
+            assert_eq!(Comb::new(count, range), None, "{count} {range:?}");
+        }
+    }
+}
