@@ -4,7 +4,7 @@
 //! averages, so that the RGB image is unbiased whatever N. A film of responses has a channel for each of them
 //! in place of the bands.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use super::cie;
 use super::comb::Comb;
@@ -15,7 +15,7 @@ use super::samples::{Columns, Samples, Spectra as _, Spectral as _};
 use super::spectrum::{Spectrum, Upsampled};
 use super::texels::Pixels;
 use super::upsample::Table;
-use crate::lanes::{Ints as _, Kernel, Lanes, Task, Vec2};
+use crate::lanes::{Call, Ints as _, Kernel, Lanes, Task, Vec2};
 
 /// Up to `N` bands in `N` lanes; lanes in excess carry nothing.
 #[derive(Clone, Debug)]
@@ -54,7 +54,11 @@ impl<const N: usize> ColorModel for Bands<N> {
     type Columns<F: Lanes> = Columns<F, N>;
 
     fn run<T: Task>(kernel: Kernel, task: T) -> T::Output {
-        kernel.run_single(task)
+        // Sixteen lanes of more channels take longer to compile than they save.
+        match N <= 32 {
+            true => kernel.run_many(task),
+            false => kernel.run_single(task),
+        }
     }
 
     #[inline]
@@ -88,6 +92,14 @@ impl<const N: usize> ColorModel for Bands<N> {
     #[inline]
     fn evaluate(stored: &Spectrum, wavelengths: &[f32; N]) -> Samples<N> {
         Samples(stored.sample(wavelengths))
+    }
+
+    #[inline(always)]
+    fn evaluate_lanes<F: Lanes>(stored: &Spectrum, wavelengths: &[[f32; N]]) -> Columns<F, N> {
+        F::call(Evaluation {
+            stored,
+            wavelengths,
+        })
     }
 
     fn evaluate_rgb(&self, rgb: [f32; 3], role: Role, wavelengths: &[f32; N]) -> Samples<N> {
@@ -179,18 +191,20 @@ impl<const N: usize> ColorModel for Bands<N> {
     }
 
     fn develop(&self, sample: &Samples<N>, wavelengths: &[f32; N], out: &mut [f32]) {
-        let mut xyz = [0.0; 3];
+        let nodes = observer();
+        let mut rgb = [0.0; 3];
         let count = self.comb.count();
         for i in 0..count {
-            let weight = cie::xyz(wavelengths[i]);
+            let Some((node, t)) = cie::locate(wavelengths[i]) else {
+                continue;
+            };
+            let (a, b) = (sample[i] * (1.0 - t), sample[i] * t);
             for c in 0..3 {
-                xyz[c] += f64::from(sample[i] * weight[c]);
+                rgb[c] += a * nodes[node][c] + b * nodes[node + 1][c];
             }
         }
-        let scale = f64::from(self.comb.width() * cie::NORMALIZATION);
-        let rgb = xyz_to_rgb(xyz.map(|v| v * scale));
         for c in 0..3 {
-            out[c] = rgb[c] as f32;
+            out[c] = rgb[c] * self.comb.width();
         }
         let (values, wavelengths) = (&sample.0[..count], &wavelengths[..count]);
         if self.responses.is_empty() {
@@ -199,6 +213,47 @@ impl<const N: usize> ColorModel for Bands<N> {
         for (out, response) in out[3..].iter_mut().zip(self.responses.iter()) {
             *out = response.of(&self.comb, values, wavelengths);
         }
+    }
+}
+
+/// The observer's curves as linear BT.709, at their nodes, in 1/nm.
+fn observer() -> &'static [[f32; 3]; cie::SAMPLES] {
+    static NODES: OnceLock<[[f32; 3]; cie::SAMPLES]> = OnceLock::new();
+    NODES.get_or_init(|| {
+        std::array::from_fn(|i| {
+            let xyz = [cie::X[i], cie::Y[i], cie::Z[i]];
+            let scaled = xyz.map(|v| f64::from(v) * f64::from(cie::NORMALIZATION));
+            xyz_to_rgb(scaled).map(|v| v as f32)
+        })
+    })
+}
+
+/// The arguments of [`ColorModel::evaluate_lanes`].
+struct Evaluation<'a, const N: usize> {
+    stored: &'a Spectrum,
+    wavelengths: &'a [[f32; N]],
+}
+
+impl<F: Lanes, const N: usize> Call<F> for Evaluation<'_, N> {
+    type Output = Columns<F, N>;
+
+    #[inline(always)]
+    fn run(self) -> Columns<F, N> {
+        let Self {
+            stored,
+            wavelengths,
+        } = self;
+        if let Spectrum::Flat(value) = stored {
+            return Columns([F::splat(*value); N]);
+        }
+        if let Spectrum::Curve(_) = stored {
+            return Columns::from_samples(|lane| Samples(stored.sample(&wavelengths[lane])));
+        }
+        let mut values: Columns<F, N> = Columns::from_samples(|lane| Samples(wavelengths[lane]));
+        for value in &mut values.0 {
+            *value = stored.at_lanes(*value);
+        }
+        values
     }
 }
 

@@ -2,7 +2,8 @@
 //! (CIE 15:2004, table T.1), linear in between and scaled so that its luminance under
 //! [`cie::NORMALIZATION`](super::cie::NORMALIZATION) is 1: RGB (1, 1, 1) is this spectrum.
 
-use super::cie::{SAMPLES, locate};
+use super::cie::{FIRST, LAST, SAMPLES, STEP, locate};
+use crate::lanes::{Ints as _, Lanes};
 
 /// What the table is divided by, as in Mitsuba 3: ∫ D65(λ) ȳ(λ) dλ over ∫ ȳ(λ) dλ.
 const SCALE: f32 = 1.0 / 98.997_42;
@@ -15,9 +16,24 @@ pub fn d65(lambda: f32) -> f32 {
     }
 }
 
+/// The same at wavelengths in lanes.
+#[inline(always)]
+pub(super) fn d65_lanes<F: Lanes>(lambda: F) -> F {
+    let place = (lambda - F::splat(FIRST)) / F::splat(STEP);
+    let node = place.clamp(0.0, (SAMPLES - 2) as f32).to_int();
+    let t = place - node.to_float();
+    let (a, b) = (
+        F::gather(&POWER, node),
+        F::gather(&POWER, node + F::Int::splat(1)),
+    );
+    let power = F::splat(SCALE) * ((F::one() - t) * a + t * b);
+    let inside = F::splat(FIRST).le(lambda) & lambda.le(F::splat(LAST));
+    F::select(inside, power, F::zero())
+}
+
 /// Relative spectral power, 100 at 560 nm.
 #[rustfmt::skip]
-const POWER: [f32; SAMPLES] = [
+static POWER: [f32; SAMPLES] = [
     46.6383, 49.3637, 52.0891, 51.0323, 49.9755, 52.3118, 54.6482, 68.7015,
     82.7549, 87.1204, 91.486, 92.4589, 93.4318, 90.057, 86.6823, 95.7736,
     104.865, 110.936, 117.008, 117.41, 117.812, 116.336, 114.861, 115.392,
@@ -52,6 +68,14 @@ mod tests {
             );
         }
         assert_eq!(d65(359.0), 0.0);
+    }
+
+    #[test]
+    fn lanes_see_the_same_daylight() {
+        for i in 0..5000 {
+            let lambda = 350.0 + 0.1 * i as f32;
+            assert_eq!(d65_lanes::<f32>(lambda), d65(lambda), "{lambda}");
+        }
     }
 
     #[test]

@@ -3,7 +3,7 @@
 
 use std::ops::{Add, AddAssign, Div, Index, IndexMut, Mul, MulAssign, Sub};
 
-use crate::lanes::{Lanes, Mask as _};
+use crate::lanes::{Call, Lanes, Mask as _};
 
 /// The operations on one value a channel that light transport needs.
 pub trait Spectral:
@@ -143,9 +143,8 @@ pub trait Spectra<F: Lanes>:
     fn from_samples<S: Spectral>(sample: impl FnMut(usize) -> S) -> Self;
     /// `yes` where the mask is set, else `no`.
     fn select(mask: F::Mask, yes: Self, no: Self) -> Self;
-    /// With another channel.
-    #[must_use]
-    fn with(self, channel: usize, value: F) -> Self;
+    /// Exchanges a channel.
+    fn set(&mut self, channel: usize, value: F);
 
     /// Darkness.
     #[inline(always)]
@@ -187,11 +186,7 @@ impl<F: Lanes, const N: usize> Spectra<F> for Columns<F, N> {
 
     #[inline(always)]
     fn rows(self) -> [F::Row; N] {
-        let mut rows = [F::ROW; N];
-        for (row, column) in rows.iter_mut().zip(self.0) {
-            column.store(row);
-        }
-        rows
+        done::<F, _, N>(ToRows(&self))
     }
 
     #[inline(always)]
@@ -221,17 +216,13 @@ impl<F: Lanes, const N: usize> Spectra<F> for Columns<F, N> {
     }
 
     #[inline(always)]
-    fn select(mask: F::Mask, yes: Self, mut no: Self) -> Self {
-        for (no, yes) in no.0.iter_mut().zip(yes.0) {
-            *no = F::select(mask, yes, *no);
-        }
-        no
+    fn select(mask: F::Mask, yes: Self, no: Self) -> Self {
+        done::<F, _, N>(Choice(mask, &yes, &no))
     }
 
     #[inline(always)]
-    fn with(mut self, channel: usize, value: F) -> Self {
+    fn set(&mut self, channel: usize, value: F) {
         self.0[channel] = value;
-        self
     }
 }
 
@@ -243,35 +234,107 @@ impl<F, const N: usize> Index<usize> for Columns<F, N> {
     }
 }
 
+/// Operations of up to so many channels are expanded where they stand; those of more are functions of their own, for the code
+/// would be that many times as long.
+const EXPANDED: usize = 3;
+
+/// Sums, products and choices channel by channel.
+struct Sum<'a, F, const N: usize>(&'a Columns<F, N>, &'a Columns<F, N>);
+struct Product<'a, F, const N: usize>(&'a Columns<F, N>, &'a Columns<F, N>);
+struct Scaled<'a, F, const N: usize>(&'a Columns<F, N>, F);
+struct Choice<'a, F: Lanes, const N: usize>(F::Mask, &'a Columns<F, N>, &'a Columns<F, N>);
+struct ToRows<'a, F, const N: usize>(&'a Columns<F, N>);
+
+impl<F: Lanes, const N: usize> Call<F> for Sum<'_, F, N> {
+    type Output = Columns<F, N>;
+    #[inline(always)]
+    fn run(self) -> Columns<F, N> {
+        let mut sum = *self.0;
+        for (a, b) in sum.0.iter_mut().zip(&self.1.0) {
+            *a = *a + *b;
+        }
+        sum
+    }
+}
+
+impl<F: Lanes, const N: usize> Call<F> for Product<'_, F, N> {
+    type Output = Columns<F, N>;
+    #[inline(always)]
+    fn run(self) -> Columns<F, N> {
+        let mut product = *self.0;
+        for (a, b) in product.0.iter_mut().zip(&self.1.0) {
+            *a = *a * *b;
+        }
+        product
+    }
+}
+
+impl<F: Lanes, const N: usize> Call<F> for Scaled<'_, F, N> {
+    type Output = Columns<F, N>;
+    #[inline(always)]
+    fn run(self) -> Columns<F, N> {
+        let mut product = *self.0;
+        for a in &mut product.0 {
+            *a = *a * self.1;
+        }
+        product
+    }
+}
+
+impl<F: Lanes, const N: usize> Call<F> for Choice<'_, F, N> {
+    type Output = Columns<F, N>;
+    #[inline(always)]
+    fn run(self) -> Columns<F, N> {
+        let mut chosen = *self.2;
+        for (no, yes) in chosen.0.iter_mut().zip(&self.1.0) {
+            *no = F::select(self.0, *yes, *no);
+        }
+        chosen
+    }
+}
+
+impl<F: Lanes, const N: usize> Call<F> for ToRows<'_, F, N> {
+    type Output = [F::Row; N];
+    #[inline(always)]
+    fn run(self) -> [F::Row; N] {
+        let mut rows = [F::ROW; N];
+        for (row, column) in rows.iter_mut().zip(&self.0.0) {
+            column.store(row);
+        }
+        rows
+    }
+}
+
+/// Does an operation of `N` channels, where it stands or in a function.
+#[inline(always)]
+fn done<F: Lanes, T: Call<F>, const N: usize>(operation: T) -> T::Output {
+    if N <= EXPANDED {
+        operation.run()
+    } else {
+        F::call(operation)
+    }
+}
+
 impl<F: Lanes, const N: usize> Add for Columns<F, N> {
     type Output = Self;
     #[inline(always)]
-    fn add(mut self, other: Self) -> Self {
-        for (a, b) in self.0.iter_mut().zip(other.0) {
-            *a = *a + b;
-        }
-        self
+    fn add(self, other: Self) -> Self {
+        done::<F, _, N>(Sum(&self, &other))
     }
 }
 
 impl<F: Lanes, const N: usize> Mul for Columns<F, N> {
     type Output = Self;
     #[inline(always)]
-    fn mul(mut self, other: Self) -> Self {
-        for (a, b) in self.0.iter_mut().zip(other.0) {
-            *a = *a * b;
-        }
-        self
+    fn mul(self, other: Self) -> Self {
+        done::<F, _, N>(Product(&self, &other))
     }
 }
 
 impl<F: Lanes, const N: usize> Mul<F> for Columns<F, N> {
     type Output = Self;
     #[inline(always)]
-    fn mul(mut self, factor: F) -> Self {
-        for a in &mut self.0 {
-            *a = *a * factor;
-        }
-        self
+    fn mul(self, factor: F) -> Self {
+        done::<F, _, N>(Scaled(&self, factor))
     }
 }

@@ -2,10 +2,11 @@
 
 use std::sync::Arc;
 
-use super::d65::d65;
+use super::d65::{d65, d65_lanes};
 use super::model::{Color, Role};
 use super::rgb::{check, curve};
 use super::upsample::{Sigmoid, Table, fit};
+use crate::lanes::{Ints as _, Lanes};
 
 /// A value over wavelength.
 #[derive(Clone, Debug, PartialEq)]
@@ -57,6 +58,16 @@ impl Upsampled {
         }
     }
 
+    /// At wavelengths in nm, one a lane.
+    #[inline(always)]
+    fn at_lanes<F: Lanes>(&self, lambda: F) -> F {
+        let shape = F::splat(self.scale) * self.sigmoid.eval_lanes(lambda);
+        match self.illuminant {
+            true => shape * d65_lanes(lambda),
+            false => shape,
+        }
+    }
+
     /// At wavelengths in nm.
     #[inline]
     pub(super) fn sample<const N: usize>(&self, wavelengths: &[f32; N]) -> [f32; N] {
@@ -96,16 +107,25 @@ impl Even {
         })
     }
 
+    /// At wavelengths in nm, one a lane.
+    #[inline(always)]
+    fn at_lanes<F: Lanes>(&self, lambda: F) -> F {
+        let last = (self.values.len() - 1) as f32;
+        let place = (lambda - F::splat(self.first)) * F::splat(self.per_nm);
+        let node = place.clamp(0.0, last - 1.0).to_int();
+        let t = (place - node.to_float()).clamp(0.0, 1.0);
+        let (a, b) = (
+            F::gather(&self.values, node),
+            F::gather(&self.values, node + F::Int::splat(1)),
+        );
+        let value = (F::one() - t) * a + t * b;
+        let inside = F::splat(self.first).le(lambda) & lambda.le(F::splat(self.last));
+        F::select(inside, value, F::zero())
+    }
+
     #[inline]
     fn at(&self, lambda: f32) -> f32 {
-        let place = (lambda - self.first) * self.per_nm;
-        let node = (place.max(0.0) as usize).min(self.values.len() - 2);
-        let t = (place - node as f32).clamp(0.0, 1.0);
-        let value = (1.0 - t) * self.values[node] + t * self.values[node + 1];
-        match (self.first..=self.last).contains(&lambda) {
-            true => value,
-            false => 0.0,
-        }
+        self.at_lanes(lambda)
     }
 }
 
@@ -176,6 +196,23 @@ impl Spectrum {
             Self::Upsampled(upsampled) => upsampled.sample(wavelengths),
             Self::Curve(points) => wavelengths.map(|l| curve(points, f64::from(l)) as f32),
             Self::Even(even) => wavelengths.map(|l| even.at(l)),
+        }
+    }
+
+    /// At wavelengths in nm, one a lane; points at uneven steps are asked one by one.
+    #[inline(always)]
+    pub(super) fn at_lanes<F: Lanes>(&self, lambda: F) -> F {
+        match self {
+            Self::Flat(value) => F::splat(*value),
+            Self::Upsampled(upsampled) => upsampled.at_lanes(lambda),
+            Self::Even(even) => even.at_lanes(lambda),
+            Self::Curve(points) => {
+                let mut row = lambda.row();
+                for lane in 0..F::WIDTH {
+                    row[lane] = curve(points, f64::from(row[lane])) as f32;
+                }
+                F::load(&row)
+            }
         }
     }
 

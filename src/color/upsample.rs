@@ -10,6 +10,7 @@ use std::sync::OnceLock;
 
 use super::cie;
 use super::d65::d65;
+use crate::lanes::Lanes;
 
 pub use table::Table;
 
@@ -36,6 +37,16 @@ impl Sigmoid {
     pub fn eval(&self, lambda: f32) -> f32 {
         let [c0, c1, c2] = self.c;
         sigmoid((c0 * lambda + c1) * lambda + c2).0
+    }
+
+    /// The same at wavelengths in lanes.
+    #[inline(always)]
+    pub(super) fn eval_lanes<F: Lanes>(&self, lambda: F) -> F {
+        let [c0, c1, c2] = self.c.map(|c| F::splat(c));
+        let v = (c0 * lambda + c1) * lambda + c2;
+        let root = (F::one() + v * v).sqrt();
+        let tail = F::splat(0.5) / (root * (root + v.abs()));
+        F::select(v.lt(F::zero()), tail, F::one() - tail)
     }
 
     /// From the coefficients of t², t and 1, where t runs from −1 to 1 over the visible range.

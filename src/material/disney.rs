@@ -171,7 +171,7 @@ impl<F: Lanes, S: Spectra<F>> Point<F, S> {
         let strength = self.sheen * schlick_weight(cos_d.abs());
         let mut sheen = self.tint;
         for c in 0..S::CHANNELS {
-            sheen = sheen.with(c, strength * lerp(F::one(), sheen[c], self.sheen_tint));
+            sheen.set(c, strength * lerp(F::one(), sheen[c], self.sheen_tint));
         }
         sheen
     }

@@ -108,7 +108,7 @@ impl<C: ColorModel> Dispersion<C> {
         let mut reflectances = C::Columns::<F>::zero();
         for channel in 0..C::Sample::LANES {
             let boundary = fresnel::dielectric_lanes(wi.z, indices[channel]);
-            reflectances = reflectances.with(channel, boundary.reflectance);
+            reflectances.set(channel, boundary.reflectance);
         }
         let mean = self.mean(reflectances);
         let all = F::Mask::splat(true);
@@ -125,7 +125,7 @@ impl<C: ColorModel> Dispersion<C> {
         let mut alike = C::Columns::<F>::zero();
         for channel in 0..C::Sample::LANES {
             let is_alike = indices[channel].eq(index);
-            alike = alike.with(channel, F::select(is_alike, one, F::zero()));
+            alike.set(channel, F::select(is_alike, one, F::zero()));
         }
         let share = (one - boundary.reflectance) / (one - mean) / self.mean(alike);
         let spread = one / (boundary.eta * boundary.eta);

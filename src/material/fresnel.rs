@@ -66,7 +66,7 @@ pub(super) fn conductor<F: Lanes, S: Spectra<F>>(cos_i: F, eta: S, k: S) -> S {
         // 0/0 only where n = k = 0 at normal incidence: there both polarisations are alike.
         let told = zero.lt(sum + cross);
         let ratio = F::select(told, (sum - cross) / (sum + cross), one);
-        reflectance = reflectance.with(c, F::splat(0.5) * s * (one + ratio));
+        reflectance.set(c, F::splat(0.5) * s * (one + ratio));
     }
     reflectance
 }

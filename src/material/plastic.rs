@@ -84,7 +84,7 @@ impl<C: ColorModel> Base<C> {
         for c in 0..C::Columns::<F>::CHANNELS {
             let diffuse = value[c];
             let again = if self.nonlinear { diffuse } else { F::one() };
-            value = value.with(c, scale * diffuse / (F::one() - again * internal));
+            value.set(c, scale * diffuse / (F::one() - again * internal));
         }
         value
     }

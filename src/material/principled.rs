@@ -137,7 +137,7 @@ impl<C: ColorModel> Principled<C> {
             let value = untinted
                 + mix.metallic * schlick.reflectance(point.base_color[c])
                 + tinted * schlick.reflectance(point.tint[c] * r0);
-            reflectance = reflectance.with(c, value);
+            reflectance.set(c, value);
         }
         reflectance
     }
@@ -231,7 +231,7 @@ impl<C: ColorModel> BlockBsdf<C> for Principled<C> {
         let scale = scale * mix.glass * passing / (interface.eta * interface.eta);
         let mut value = point.base_color;
         for c in 0..C::Columns::<F>::CHANNELS {
-            value = value.with(c, value[c].max(zero).sqrt() * scale);
+            value.set(c, value[c].max(zero).sqrt() * scale);
         }
         let refracted = BsdfValues {
             value,

@@ -148,7 +148,7 @@ impl<C: ColorModel> BlockBsdf<C> for PrincipledThin<C> {
         let mut mirror = point.tint;
         for c in 0..C::Columns::<F>::CHANNELS {
             let tinted = schlick.reflectance(point.tint[c] * r0);
-            mirror = mirror.with(c, specular * lerp(fresnel, tinted, point.spec_tint));
+            mirror.set(c, specular * lerp(fresnel, tinted, point.spec_tint));
         }
         let cos_d = wo.dot(m);
         let diffuse = point.diffuse(wi.z, cos_o, cos_d) + point.sheen(cos_d);

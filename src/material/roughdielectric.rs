@@ -175,8 +175,8 @@ impl<C: ColorModel> RoughDielectric<C> {
             let value = share * dg * radiance * interface.jacobian * (cos / wi.z).abs();
             let density = drawn_from.pdf(front, m) * share * interface.jacobian;
             let there = interface.found & zero.lt(dg);
-            values = values.with(channel, F::select(there, value, zero));
-            densities = densities.with(channel, F::select(there, density, zero));
+            values.set(channel, F::select(there, value, zero));
+            densities.set(channel, F::select(there, density, zero));
         }
         let factor = C::Columns::<F>::select(
             zero.lt(wi.z * wo.z),

@@ -97,8 +97,8 @@ impl<C: ColorModel> ThinDielectric<C> {
         for channel in 0..C::Columns::<F>::CHANNELS {
             let once = fresnel::dielectric_lanes(wi.z.abs(), indices[channel]).reflectance;
             let reflectance = (once + once) / (one + once);
-            reflectances = reflectances.with(channel, reflectance);
-            rests = rests.with(channel, one - reflectance);
+            reflectances.set(channel, reflectance);
+            rests.set(channel, one - reflectance);
         }
         let mean = dispersion.mean(reflectances);
         let reflected = BsdfSamples::delta(
