@@ -6,6 +6,7 @@
 //! 0 agree, 1 differ, 2 cannot compare.
 
 mod check;
+mod color;
 mod compare;
 mod convert;
 mod crosscheck;
@@ -15,6 +16,7 @@ mod plugins;
 mod profile;
 mod relight;
 mod render;
+mod spectrum;
 
 mod available;
 mod batch;
@@ -52,6 +54,7 @@ struct Arguments {
 enum Command {
     Render(Box<render::Arguments>),
     Check(check::Arguments),
+    Color(color::Arguments),
     Compare(Box<compare::Arguments>),
     Convert(convert::Arguments),
     Crosscheck(Box<crosscheck::Arguments>),
@@ -60,6 +63,7 @@ enum Command {
     Plugins(plugins::Arguments),
     Profile(Box<profile::Arguments>),
     Relight(relight::Arguments),
+    Spectrum(spectrum::Arguments),
     /// Étendue's side of a crosscheck, which starts it: answers orders on standard input
     #[command(hide = true)]
     CrosscheckWorker,
@@ -74,6 +78,7 @@ pub(crate) fn run() -> ExitCode {
     let result = match Arguments::parse().command {
         Command::Render(arguments) => render::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
+        Command::Color(arguments) => color::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Convert(arguments) => convert::run(&arguments),
         Command::Crosscheck(arguments) => crosscheck::run(&arguments),
@@ -82,6 +87,7 @@ pub(crate) fn run() -> ExitCode {
         Command::Plugins(arguments) => plugins::run(&arguments),
         Command::Profile(arguments) => profile::run(&arguments),
         Command::Relight(arguments) => relight::run(&arguments),
+        Command::Spectrum(arguments) => spectrum::run(&arguments),
         Command::CrosscheckWorker => crosscheck::serve(),
     };
     let status = result.unwrap_or_else(|error| {

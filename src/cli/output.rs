@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use etendue::error::{Error, Result};
-use etendue::image;
+use etendue::{file, image};
 
 /// What the placeholders of a pattern stand for.
 #[derive(Clone, Copy, Debug)]
@@ -144,6 +144,18 @@ pub(super) fn line(text: &str) {
 pub(super) fn failure() -> Option<Error> {
     let path = Path::new("standard output");
     FAILED.get().map(|e| Error::system("write", path, e))
+}
+
+/// Writes a drawing; its name ends in `.svg`.
+pub(super) fn write_svg(path: &Path, svg: &str) -> Result<()> {
+    if path
+        .extension()
+        .is_none_or(|e| !e.eq_ignore_ascii_case("svg"))
+    {
+        let error = Error::input(format!("a drawing cannot be stored as {}", path.display()));
+        return Err(error.help("use .svg"));
+    }
+    file::write_atomically(path, svg.as_bytes())
 }
 
 #[cfg(test)]

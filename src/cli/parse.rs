@@ -4,6 +4,7 @@ use std::num::NonZeroUsize;
 use std::thread;
 
 use clap::builder::RangedI64ValueParser;
+use etendue::color::Space;
 use etendue::relight::Weight;
 use etendue::sampler::MAX_SAMPLES;
 use etendue::sensor::Window;
@@ -188,6 +189,27 @@ impl Shutter {
             Self::Degrees(degrees) => (begin, (frame as f64 + degrees / 360.0) / fps),
         }
     }
+}
+
+/// `lab`
+pub(super) fn space(text: &str) -> Parsed<Space> {
+    Space::named(text).ok_or_else(|| {
+        let names = Space::ALL.map(|(name, _)| name).join(", ");
+        format!("there are {names}")
+    })
+}
+
+/// The name of a space that has primaries.
+pub(super) fn gamut(text: &str) -> Parsed<String> {
+    match space(text)?.primaries() {
+        Some(_) => Ok(text.to_owned()),
+        None => Err(format!("{text} has no primaries, as bt709 has")),
+    }
+}
+
+/// `0.2,0.5,0.8`
+pub(super) fn color(text: &str) -> Parsed<[f64; 3]> {
+    point(text).map(|color| color.to_array())
 }
 
 /// `380,780`

@@ -32,6 +32,7 @@ pub use self::canonical::{Canonical, Part};
 pub use self::properties::Properties;
 use self::reader::Reader;
 use self::resolve::Scopes;
+pub use self::values::spectrum_file;
 use crate::budget::Budget;
 use crate::error::{Location, Problem, Result};
 

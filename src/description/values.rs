@@ -191,8 +191,12 @@ fn listed_spectrum(text: &str) -> Result<Spectrum> {
     finished(curve)
 }
 
-/// A text file of lines `wavelength value`; `#` begins a comment.
-fn spectrum_file(text: &str, path: &Path) -> Result<Spectrum> {
+/// The curve of a text file of lines `wavelength value`, wavelengths increasing; `#` begins a comment. `path` is where errors
+/// point.
+///
+/// # Errors
+/// Where a line holds anything else, wavelengths do not increase, or there are less than two.
+pub fn spectrum_file(text: &str, path: &Path) -> Result<Spectrum> {
     let mut curve = Vec::new();
     for (line, number) in lines(text.as_bytes()).zip(1..) {
         let line = String::from_utf8_lossy(line);

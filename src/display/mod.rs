@@ -2,6 +2,7 @@
 //! a view (how more light than a display has is compressed), glare, the display's primaries, its curve, and as many bits
 //! as it has. [`save`] is how renders leave: EXR, HDR and PFM stay linear, PNG is encoded.
 
+pub mod diagram;
 pub mod srgb;
 
 mod aces;
@@ -11,6 +12,7 @@ mod dither;
 mod exposure;
 mod glare;
 mod local;
+mod native;
 mod sigmoid;
 mod transfer;
 
@@ -24,6 +26,7 @@ use crate::error::{Error, Result};
 use crate::image::{self, Code, Codes, Format, Image, Layout, Metadata, Tag, Window};
 
 pub use exposure::Exposure;
+pub use native::{chromaticities_of, gamut, native};
 pub use transfer::{Transfer, WHITE_NITS};
 
 /// How light beyond the display's range is brought into it.

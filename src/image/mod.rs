@@ -3,6 +3,7 @@
 //! to be of other primaries, which become those of BT.709; writing takes linear values as EXR, HDR or PFM and ready
 //! codes as PNG or JPEG. Which curve lies between the two is the display layer's business.
 
+mod bands;
 mod buffer;
 mod codes;
 mod format;
@@ -21,6 +22,7 @@ use std::io::Read;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
+pub use bands::{Band, bands};
 pub use buffer::Image;
 pub use codes::{Code, Codes, Layout, Tag, write_codes};
 pub use format::Format;

@@ -3,7 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Axis, Fit, Model, Noise, Point, Quantity, Series, Way};
+use super::{Axis, Fit, Model, Noise, Observed, Point, Quantity, Series, Way};
 
 /// How far an exponent may be from the predicted one.
 const TOLERANCE: f64 = 0.05;
@@ -114,13 +114,7 @@ pub(super) fn all(series: &[Series], noise: &Noise) -> Vec<Verdict> {
             Q::Render,
             1.0,
         ),
-        power(
-            "band loop, one ray for all bands",
-            Axis::Bands,
-            Way::Tree,
-            Q::Render,
-            1.0,
-        ),
+        judge.bands(),
     ];
     verdicts.into_iter().flatten().collect()
 }
@@ -201,6 +195,40 @@ impl Judge<'_> {
             } else {
                 self.of_time(&fit, exponent)
             },
+        })
+    }
+
+    /// The textbook's rays, one for three bands, beside what a path costs that carries all of them.
+    fn bands(&self) -> Option<Verdict> {
+        let series = self.along(Axis::Bands, Way::Tree)?;
+        let fit = series.growth(Quantity::Render, Model::Power)?.fit;
+        let observed = series.observed(Quantity::Render, 0.0);
+        let median = |values: &[f64]| {
+            let mut values = values.to_vec();
+            values.sort_by(f64::total_cmp);
+            values.get(values.len() / 2).copied()
+        };
+        let (rgb, bands) = observed.split_first()?;
+        let rgb_time = median(&rgb.values)?;
+        let times = |of: &dyn Fn(f64, f64) -> f64| -> Vec<String> {
+            let of_one = |point: &Observed| {
+                let ratio = of(point.x, median(&point.values)?);
+                Some(format!("{ratio:.1}× for {}", point.x))
+            };
+            bands.iter().filter_map(of_one).collect()
+        };
+        Some(Verdict {
+            subject: "band loop, one ray for all bands".to_owned(),
+            predicted: format!(
+                "time × N/3: {} the time of RGB",
+                times(&|n, _| n / 3.0).join(", ")
+            ),
+            measured: format!(
+                "{}; {}",
+                times(&|_, time| time / rgb_time).join(", "),
+                exponent_text(Axis::Bands, &fit)
+            ),
+            outcome: self.of_time(&fit, 1.0),
         })
     }
 

@@ -108,6 +108,8 @@ fn help_reads_as_it_was_blessed() {
         ("info", &["info", "--help"]),
         ("convert", &["convert", "--help"]),
         ("relight", &["relight", "--help"]),
+        ("color", &["color", "--help"]),
+        ("spectrum", &["spectrum", "--help"]),
         ("crosscheck", &["crosscheck", "--help"]),
         ("mesh", &["mesh", "--help"]),
         ("mesh-convert", &["mesh", "convert", "--help"]),

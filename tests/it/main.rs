@@ -7,6 +7,7 @@ mod bands;
 mod channels;
 mod cli;
 mod closed_form;
+mod color;
 mod commands;
 mod compare;
 mod crosscheck;
