@@ -10,6 +10,7 @@ mod compare;
 mod convert;
 mod crosscheck;
 mod info;
+mod merge;
 mod mesh;
 mod plugins;
 mod profile;
@@ -56,6 +57,7 @@ enum Command {
     Convert(convert::Arguments),
     Crosscheck(Box<crosscheck::Arguments>),
     Info(info::Arguments),
+    Merge(merge::Arguments),
     Mesh(mesh::Arguments),
     Plugins(plugins::Arguments),
     Profile(Box<profile::Arguments>),
@@ -78,6 +80,7 @@ pub(crate) fn run() -> ExitCode {
         Command::Convert(arguments) => convert::run(&arguments),
         Command::Crosscheck(arguments) => crosscheck::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
+        Command::Merge(arguments) => merge::run(&arguments),
         Command::Mesh(arguments) => mesh::run(&arguments),
         Command::Plugins(arguments) => plugins::run(&arguments),
         Command::Profile(arguments) => profile::run(&arguments),

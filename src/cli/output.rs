@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use etendue::error::{Error, Result};
-use etendue::image;
+use etendue::{image, render};
 
 /// What the placeholders of a pattern stand for.
 #[derive(Clone, Copy, Debug)]
@@ -119,7 +119,10 @@ pub(super) fn check_writable<'a>(outputs: impl Iterator<Item = &'a Path>) -> Res
     let mut tried = HashSet::new();
     for output in outputs {
         if tried.insert((output.parent(), output.extension())) || output.exists() {
-            image::check_writable(output)?;
+            match render::is_part(output) {
+                true => render::check_part_writable(output)?,
+                false => image::check_writable(output)?,
+            }
         }
     }
     Ok(())

@@ -12,7 +12,8 @@ use etendue::display;
 use etendue::error::{Error, Problem, Result};
 use etendue::image;
 use etendue::render::{
-    Adaptive, Checkpoint, Options, Overrides, Progress, Rendered, Session, is_mesh, sensors,
+    Adaptive, Checkpoint, Options, Overrides, Passes, Progress, Rendered, Session, is_mesh,
+    is_part, sensors,
 };
 use glam::DVec3;
 
@@ -33,7 +34,7 @@ use super::{output, report, status};
 ///
 /// INPUT is a Mitsuba 3 scene (.xml) or a bare mesh (.ply, .obj), which gets an automatic camera on a
 /// ground under a soft sky. The extension of OUT says the format: .exr (linear, float32, with metadata and
-/// all channels), .hdr (linear) or .png (sRGB).
+/// all channels), .hdr (linear), .png (sRGB), or .part: the sums that `etendue merge` makes images of.
 ///
 /// Ctrl-C, SIGTERM and SIGHUP end a render early: the tiles under way are finished and the image of what
 /// is complete is written. A second signal ends the process at once.
@@ -84,6 +85,11 @@ pub(super) struct Arguments {
     /// Leave out images whose file is there, unless a checkpoint lies beside it
     #[arg(long, help_heading = SERIES)]
     skip_existing: bool,
+
+    /// Render only these passes, into a .part file that `etendue merge` puts together with the others: the first has
+    /// one sample a pixel, the second 15, each that follows 16. Of adaptive sampling the first is the pilots
+    #[arg(long, value_name = "FIRST:END", value_parser = parse::passes, help_heading = SERIES)]
+    passes: Option<Passes>,
 
     /// Stop an image after so many seconds, and write what is complete
     #[arg(long, value_name = "SECONDS", value_parser = parse::seconds, help_heading = RUN)]
@@ -199,6 +205,37 @@ impl Arguments {
         }
     }
 
+    /// Refuses what cannot go together.
+    fn check(&self) -> Result<()> {
+        if let Some(least) = self.min_spp.filter(|least| *least > self.max_spp) {
+            let message = format!("--min-spp {least} is more than --max-spp {}", self.max_spp);
+            return Err(Error::input(message));
+        }
+        let of_whole = [
+            (self.time_limit.is_some(), "--time-limit"),
+            (self.checkpoint.is_some(), "--checkpoint"),
+            (self.resume, "--resume"),
+            (self.heatmap.is_some(), "--heatmap"),
+        ];
+        let is_part = is_part(Path::new(&self.output));
+        match of_whole.into_iter().find(|(given, _)| *given) {
+            Some((_, option)) if is_part => {
+                let message = format!("{option} is for images, and {} is a part", self.output);
+                Err(Error::input(message)
+                    .help("a part is whole or not there: make it smaller by --crop or --passes"))
+            }
+            _ if self.passes.is_some() && !is_part => {
+                let message = format!(
+                    "--passes makes a part of an image, and {} is an image",
+                    self.output
+                );
+                Err(Error::input(message)
+                    .help("name the output .part, and give all parts to etendue merge"))
+            }
+            _ => Ok(()),
+        }
+    }
+
     fn style(&self) -> Style {
         Style {
             quiet: self.quiet,
@@ -227,13 +264,7 @@ impl Arguments {
 
 /// Runs the command; the answer is the exit status.
 pub(super) fn run(arguments: &Arguments) -> Result<u8> {
-    if let Some(least) = arguments.min_spp.filter(|least| *least > arguments.max_spp) {
-        let message = format!(
-            "--min-spp {least} is more than --max-spp {}",
-            arguments.max_spp
-        );
-        return Err(Error::input(message));
-    }
+    arguments.check()?;
     let stop = Stop::on_signals()?;
     let budget = arguments.run.memory.budget_until(&stop);
     let Batch { items, failed } = arguments.batch(&budget)?;
@@ -314,21 +345,31 @@ impl Series<'_> {
         }
         let read = self.read(item)?;
         let bar = Bar::new(&item.name(), arguments.quiet, stop);
-        let rendered = self.look(item, read, &options, &bar);
+        let posed = self.pose(item, &read.1, &options, &bar);
+        let seen = posed.and_then(|posed| {
+            let seen = posed.as_ref().unwrap_or(&read.1);
+            match is_part(&item.output) {
+                true => self.part(item, seen, &options, &bar),
+                false => self.image(item, seen, &options, &bar),
+            }
+        });
         bar.finish();
-        let rendered = rendered?;
-        self.finish(item, &options, rendered)
+        if seen.is_ok() && is_mesh(&item.input) {
+            let (as_read, description) = read;
+            self.read = Some((item.input.clone(), as_read, description));
+        }
+        seen
     }
 
-    /// Renders the description, from where the turntable has turned the camera, and keeps it.
-    fn look(
+    /// The description at the item's time and from where the turntable has turned the camera, where that is another.
+    fn pose(
         &mut self,
         item: &Item,
-        (as_read, description): (description::Options, Description),
+        description: &Description,
         options: &Options,
         bar: &Bar,
-    ) -> Result<Rendered> {
-        let sensor = sensors(&description).get(item.sensor).copied();
+    ) -> Result<Option<Description>> {
+        let sensor = sensors(description).get(item.sensor).copied();
         let turned = self.arguments.turntable.zip(item.frame).zip(sensor);
         let mut posed = None;
         let shutter = self.arguments.image.shutter(item.frame.unwrap_or(0));
@@ -340,9 +381,9 @@ impl Series<'_> {
             overrides.apply(posed.insert(description.clone()));
         }
         if let Some(((count, frame), sensor)) = turned {
-            let bounds = self.session.bounds(&description, options, bar)?;
+            let bounds = self.session.bounds(description, options, bar)?;
             let pivot = self.arguments.pivot;
-            let center = pivot.unwrap_or_else(|| turntable::pivot(&description, sensor, &bounds));
+            let center = pivot.unwrap_or_else(|| turntable::pivot(description, sensor, &bounds));
             let speed = self.arguments.image.fps() / f64::from(count);
             let orbit = Orbit {
                 center,
@@ -367,16 +408,44 @@ impl Series<'_> {
                 posed.set(*shape, "times", Value::String(times));
             }
         }
-        let seen = posed.as_ref().unwrap_or(&description);
-        let mut rendered = self.session.render(seen, options, bar);
-        if let (Some(path), Ok(_), false) = (&item.heatmap, &rendered, bar.stop()) {
-            let drawn = self.heatmap(seen, path, options, bar);
-            rendered = rendered.and_then(|rendered| drawn.map(|()| rendered));
+        Ok(posed)
+    }
+
+    /// Renders an image and writes it.
+    fn image(
+        &mut self,
+        item: &Item,
+        seen: &Description,
+        options: &Options,
+        bar: &Bar,
+    ) -> Result<Ending> {
+        let rendered = self.session.render(seen, options, bar)?;
+        if let (Some(path), false) = (&item.heatmap, bar.stop()) {
+            self.heatmap(seen, path, options, bar)?;
         }
-        if is_mesh(&item.input) {
-            self.read = Some((item.input.clone(), as_read, description));
+        bar.finish();
+        self.finish(item, options, rendered)
+    }
+
+    /// Renders a part, which is written if it is whole.
+    fn part(
+        &mut self,
+        item: &Item,
+        seen: &Description,
+        options: &Options,
+        bar: &Bar,
+    ) -> Result<Ending> {
+        let passes = self.arguments.passes.unwrap_or_default();
+        let parted = (self.session).render_part(seen, options, passes, &item.output, bar)?;
+        bar.finish();
+        for problem in &parted.warnings {
+            self.warn_of(problem);
         }
-        rendered
+        if parted.report.completed.is_whole() {
+            return Ok(Ending::Rendered(parted.report));
+        }
+        self.warn(&summary::lost(item, &parted.report));
+        Ok(Ending::NotBegun)
     }
 
     /// When a bare glTF file's animation is looked at, as `times` are written; `None` where it has none, or nobody asks

@@ -72,6 +72,15 @@ pub(super) fn incomplete(item: &Item, report: &Report) -> Error {
     Error::input(message)
 }
 
+/// The warning that a part is not there, for it was stopped.
+pub(super) fn lost(item: &Item, report: &Report) -> Error {
+    let [tiles, of_tiles] = report.completed.units;
+    Error::input(format!(
+        "{} is not written: {tiles} of {of_tiles} tiles were done, and a part is whole or not there",
+        item.output.display()
+    ))
+}
+
 /// Tells of one image.
 pub(super) fn tell(style: Style, item: &Item, ending: &Ending, total: Duration) {
     if style.json {
@@ -112,7 +121,10 @@ fn object(item: &Item, ending: &Ending, total: Duration) -> Value {
 fn line(path: &Path, report: &Report, total: Duration) {
     let [width, height] = report.size;
     let samples = match &report.adaptive {
-        None => format!("{} samples a pixel", report.completed.samples),
+        None => match &report.passes {
+            None => format!("{} samples a pixel", report.completed.samples),
+            Some(passes) => format!("passes {}:{}", passes.start, passes.end),
+        },
         Some(adaptive) => {
             let (mean, [least, most]) = (adaptive.mean_spp, adaptive.limits);
             let mut samples = format!("{mean:.1} samples a pixel, {least} to {most}");

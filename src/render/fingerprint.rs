@@ -106,7 +106,7 @@ impl Fingerprint {
             Colors::Bands(n) => n,
         };
         let settings = format!(
-            "seed {} bands {bands} tile {TILE} pass {PASS} block {BLOCK} {:?}",
+            "seed {} bands {bands} tile {TILE} passes 1, {PASS} block {BLOCK} {:?}",
             options.seed, options.adaptive
         );
         Ok(Self {

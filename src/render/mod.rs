@@ -11,9 +11,13 @@ mod black;
 mod check;
 mod checkpoint;
 mod fingerprint;
+mod hashing;
 mod heat;
 mod info;
 mod memory;
+mod merge;
+mod origin;
+mod part;
 mod pinned;
 mod plan;
 mod plugins;
@@ -39,7 +43,9 @@ pub use bare::{Background, BareMesh, Finish, Lighting, Staging, UpAxis, describe
 pub use heat::Heat;
 pub use info::{NamedFile, SceneInfo, SensorInfo};
 pub use memory::check_mesh;
+pub use merge::{MergeReport, Merged, merge};
 pub use options::{Adaptive, Checkpoint, Colors, Options, Overrides};
+pub use part::{Passes, check_part_writable, is_part};
 pub(crate) use pinned::pin;
 pub use plan::Completed;
 pub use plugins::{Listed, plugins};
@@ -62,6 +68,15 @@ pub struct Rendered {
     pub warnings: Vec<Problem>,
 }
 
+/// A part of an image that was rendered.
+#[derive(Debug)]
+pub struct Parted {
+    /// What was done, counted and timed.
+    pub report: Report,
+    /// What the user should know.
+    pub warnings: Vec<Problem>,
+}
+
 /// What a render did.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
@@ -72,6 +87,9 @@ pub struct Report {
     /// Where samples went, if sampling is adaptive.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub adaptive: Option<AdaptiveReport>,
+    /// Which passes over the film, where it is a part of the image.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub passes: Option<std::ops::Range<u32>>,
     /// How much of it is done: all, unless the render was stopped.
     pub completed: Completed,
     /// Seed of the random numbers.

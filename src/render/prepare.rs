@@ -10,6 +10,7 @@ use super::black;
 use super::fingerprint::{self, Contents, Fingerprint};
 use super::memory::{self, Estimate};
 use super::options::{Colors, Options};
+use super::origin::Origin;
 use super::plan::Completed;
 use super::plugins;
 use super::progress::{Phase, Progress};
@@ -19,7 +20,7 @@ use crate::color::ColorModel;
 use crate::description::{Description, Kind, NodeId, Properties};
 use crate::error::{self, Error, Location, Problem, Problems, Result};
 use crate::film::Layout;
-use crate::image::{self, Metadata, Window};
+use crate::image::{self, Window};
 use crate::integrator::{self, Estimator, Footprint, Integrator};
 use crate::mesh::ReadMesh;
 use crate::sampler::Sampler;
@@ -504,6 +505,7 @@ impl<C: ColorModel> Job<'_, C> {
             size: [crop.width, crop.height],
             spp: self.view.sampler.sample_count(),
             adaptive: None,
+            passes: None,
             completed,
             seed: self.seed,
             threads: rayon::current_num_threads(),
@@ -518,27 +520,16 @@ impl<C: ColorModel> Job<'_, C> {
         }
     }
 
-    /// How the image was made.
-    pub(super) fn metadata(&self, scene_name: &str, report: &Report) -> Metadata {
-        let to_camera = self
-            .view
-            .sensor
-            .world_to_camera(self.view.sensor.shutter().0);
-        let metadata = Metadata::default()
-            .with("software", concat!("etendue ", env!("CARGO_PKG_VERSION")))
-            .with("scene", scene_name)
-            .with("integrator", self.view.integrator_name.as_str())
-            .with("spp", report.spp)
-            .with("samples_complete", report.completed.samples)
-            .with("seed", i64::try_from(report.seed).unwrap_or(i64::MAX))
-            .with("world_to_camera", to_camera)
-            .with("world_to_ndc", self.view.sensor.projection() * to_camera);
-        match &report.adaptive {
-            None => metadata,
-            Some(adaptive) => metadata
-                .with("noise_threshold", adaptive.noise_threshold)
-                .with("min_spp", adaptive.limits[0])
-                .with("max_spp", adaptive.limits[1]),
+    /// What the image is of.
+    pub(super) fn origin(&self, scene: &str) -> Origin {
+        let View { sensor, .. } = &self.view;
+        let to_camera = sensor.world_to_camera(sensor.shutter().0);
+        Origin {
+            scene: scene.to_owned(),
+            integrator: self.view.integrator_name.clone(),
+            seed: self.seed,
+            world_to_camera: to_camera.to_cols_array(),
+            world_to_ndc: (sensor.projection() * to_camera).to_cols_array(),
         }
     }
 }

@@ -3,26 +3,30 @@
 //! another takes the place of the one before, so that one is in memory at a time.
 
 use std::num::NonZeroUsize;
+use std::path::Path;
 
 use rayon::ThreadPool;
 
-use super::adaptive::{self, AdaptiveReport};
+use super::adaptive::{self, AdaptiveReport, Ladder};
 use super::black;
 use super::checkpoint::Keeper;
 use super::heat::{self, Heat};
-use super::options::{Adaptive, Colors, Options};
+use super::options::{Adaptive, Colors, Options, Overrides};
+use super::origin::Outcome;
+use super::part::{self, Head, Made, Noise, Passes};
 use super::pinned;
-use super::plan::Completed;
-use super::prepare::{self, Ask, Facts, Job, Shelf};
+use super::plan::{Completed, Plan};
+use super::prepare::{self, Ask, Facts, Job, Shelf, View};
 use super::progress::Progress;
 use super::uniform;
-use super::{Rendered, timed};
+use super::{Parted, Rendered, Report, timed};
 use crate::color::{Bands, ColorModel, Rgb};
 use crate::description::Description;
 use crate::error::{Error, Result};
 use crate::film::{Accumulator, Tally};
 use crate::image::Image;
 use crate::mesh::ReadMesh;
+use crate::sensor::Film;
 use crate::shape::Bounds;
 
 /// Renders that follow one another; see the module.
@@ -114,13 +118,7 @@ impl Task for Render<'_> {
             report.spp = adaptive.mean_spp.round() as u32;
             report.adaptive = Some(adaptive);
         }
-        report.stats = tally.stats;
-        report.seconds.spend(&tally.times);
-        report.dropped_samples = tally.dropped;
-        let margin = job.view.film.margin();
-        report.dropped_pixel = tally
-            .dropped_pixel
-            .map(|pixel| pixel.map(|place| place.saturating_sub(margin)));
+        tell(&mut report, &tally, &job.view.film);
         warnings.extend(tally.warning());
         if completed.units[0] > 0 {
             warnings.extend(black::black(&job, description, &image));
@@ -128,7 +126,11 @@ impl Task for Render<'_> {
         let rendered = Rendered {
             image,
             window: job.window(),
-            metadata: job.metadata(&options.scene, &report),
+            metadata: job.origin(&options.scene).metadata(&Outcome {
+                spp: report.spp,
+                samples_complete: report.completed.samples,
+                adaptive: report.adaptive.as_ref(),
+            }),
             report,
             warnings,
         };
@@ -137,6 +139,79 @@ impl Task for Render<'_> {
         }
         Ok(rendered)
     }
+}
+
+/// Makes a part.
+struct Part<'a> {
+    ask: Ask<'a>,
+    passes: Passes,
+    path: &'a Path,
+}
+
+impl Task for Part<'_> {
+    type Output = Parted;
+
+    fn run<C: ColorModel>(mut self, color: C) -> Result<Parted> {
+        let (description, options) = (self.ask.description, self.ask.options);
+        let progress = self.ask.progress;
+        let job = prepare::prepare(&mut self.ask, color)?;
+        let View { film, sampler, .. } = &job.view;
+        let spp = sampler.sample_count();
+        let ladder = match &options.adaptive {
+            Some(adaptive) => Some((adaptive, Ladder::checked(sampler, adaptive)?)),
+            None => None,
+        };
+        let all_passes = match &ladder {
+            Some((_, ladder)) => ladder.passes(),
+            None => Plan::new(film, spp).passes(),
+        };
+        // The fingerprint is that of the whole film, whatever the crop.
+        let mut whole = description.clone();
+        let overrides = Overrides {
+            crop: Some(film.full()),
+            ..Overrides::default()
+        };
+        overrides.apply(&mut whole);
+        let head = Head {
+            fingerprint: job.fingerprint(&whole, options)?,
+            target: part::target(),
+            origin: job.origin(&options.scene),
+            film: film.clone(),
+            layout: job.layout(),
+            spp,
+            adaptive: ladder.as_ref().map(|(adaptive, ladder)| Noise {
+                threshold: adaptive.noise_threshold,
+                limits: ladder.limits(),
+            }),
+            passes: self.passes.within(all_passes)?,
+            all_passes,
+        };
+        let mut seconds = job.spent;
+        let ladder = ladder.as_ref().map(|(_, ladder)| ladder);
+        let Made { completed, tally } = timed(&mut seconds.render, || {
+            part::make(&job, &head, ladder, self.path, progress)
+        })?;
+        let mut report = job.report(completed, seconds);
+        tell(&mut report, &tally, film);
+        report.passes = Some(head.passes.clone());
+        let mut warnings = job.warnings.clone();
+        warnings.extend(tally.warning());
+        if let Some(kept) = &mut self.ask.shelf.kept {
+            kept.told();
+        }
+        Ok(Parted { report, warnings })
+    }
+}
+
+/// What samples cost and what came of them beside the image.
+fn tell(report: &mut Report, tally: &Tally, film: &Film) {
+    report.stats = tally.stats;
+    report.seconds.spend(&tally.times);
+    report.dropped_samples = tally.dropped;
+    let margin = film.margin();
+    report.dropped_pixel = tally
+        .dropped_pixel
+        .map(|pixel| pixel.map(|place| place.saturating_sub(margin)));
 }
 
 /// Counts by pixel.
@@ -193,10 +268,15 @@ impl Finished {
         let blocks = &summed.sums;
         let mut tally = *blocks.tally();
         Ok(Self {
-            image: added(&mut tally.times.film, || adaptive::develop(job, blocks))?,
+            image: added(&mut tally.times.film, || {
+                adaptive::develop(&job.view.film, &job.layout(), blocks)
+            })?,
             completed,
             tally,
-            adaptive: Some(adaptive::report(job, adaptive, &ladder, blocks)),
+            adaptive: Some(
+                adaptive::Given::new(&job.view.film, ladder.limits(), blocks)
+                    .report(adaptive.noise_threshold, ladder.limits()),
+            ),
         })
     }
 }
@@ -237,6 +317,32 @@ impl Session {
                 traced: true,
             };
             Render(ask).run_in(options.colors)
+        })
+    }
+
+    /// Renders some passes of what `description` says into a part of the image, the file `path`, which
+    /// [`merge`](super::merge()) puts together with the others. A render that was stopped is no error: the report says
+    /// so, and no file is written.
+    ///
+    /// # Errors
+    /// As [`Session::render`], and where there are no such passes or the file cannot be written.
+    pub fn render_part(
+        &mut self,
+        description: &Description,
+        options: &Options,
+        passes: Passes,
+        path: &Path,
+        progress: &dyn Progress,
+    ) -> Result<Parted> {
+        self.run(options, |shelf| {
+            let ask = Ask {
+                shelf,
+                description,
+                options,
+                progress,
+                traced: true,
+            };
+            Part { ask, passes, path }.run_in(options.colors)
         })
     }
 

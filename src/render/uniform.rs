@@ -1,5 +1,7 @@
 //! The same number of samples for every pixel: the tiles of each pass.
 
+use std::convert::Infallible;
+
 use super::checkpoint::Keeper;
 use super::plan::{Completed, Plan};
 use super::prepare::Job;
@@ -8,7 +10,7 @@ use super::samples::{self, Sink};
 use super::unit;
 use crate::color::ColorModel;
 use crate::error::Result;
-use crate::film::{GROUP, Group, Summed, Sums, Tally};
+use crate::film::{Accumulator as _, GROUP, Group, Summed, Sums, Tally};
 use crate::filter::Filter;
 use crate::lanes::Kernel;
 use crate::sampler::Stream;
@@ -29,7 +31,16 @@ pub(super) fn render<C: ColorModel>(
     }
     progress.begin(Phase::Render, plan.samples(plan.units()));
     progress.advance(plan.samples(summed.next), 0);
-    let summed = unit::run(plan.units(), summed, progress, keeper, |unit| {
+    let first = summed.next;
+    let add = |part: Sums| {
+        summed.sums.add(&part);
+        summed.next += 1;
+        if let Some(keeper) = &mut keeper {
+            keeper.keep_when_due(&summed);
+        }
+        Ok::<_, Infallible>(())
+    };
+    let Ok(_) = unit::run(first..plan.units(), progress, add, |unit| {
         render_unit(job, &plan, unit, progress)
     });
     let completed = plan.completed(summed.next);
@@ -37,7 +48,7 @@ pub(super) fn render<C: ColorModel>(
 }
 
 /// One tile, for one pass.
-fn render_unit<C: ColorModel>(
+pub(super) fn render_unit<C: ColorModel>(
     job: &Job<'_, C>,
     plan: &Plan,
     unit: usize,

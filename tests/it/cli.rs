@@ -107,6 +107,7 @@ fn help_reads_as_it_was_blessed() {
         ("compare", &["compare", "--help"]),
         ("info", &["info", "--help"]),
         ("convert", &["convert", "--help"]),
+        ("merge", &["merge", "--help"]),
         ("relight", &["relight", "--help"]),
         ("crosscheck", &["crosscheck", "--help"]),
         ("mesh", &["mesh", "--help"]),

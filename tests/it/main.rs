@@ -20,6 +20,7 @@ mod mesh;
 mod mitsuba_data;
 mod motion;
 mod opacity;
+mod parts;
 mod phong;
 mod profile;
 mod resume;
