@@ -31,6 +31,9 @@ pub(super) struct Arguments {
     crop: Option<Window>,
     #[command(flatten)]
     memory: MemoryArguments,
+    /// Write OUT.fingerprint beside the image, which says what it was made of: see `etendue render --skip-same`
+    #[arg(long)]
+    fingerprint: bool,
     /// Print nothing where all is well
     #[arg(short, long)]
     quiet: bool,
@@ -55,9 +58,19 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         image,
         window,
         metadata,
+        provenance,
         report,
     } = merge(&arguments.parts, arguments.crop, limit)?;
-    display::save_window(&arguments.output, &image, &window, &metadata)?;
+    display::save_window(
+        &arguments.output,
+        &image,
+        &window,
+        &metadata,
+        &display::DisplayTransform::default(),
+    )?;
+    if arguments.fingerprint {
+        provenance.write(&arguments.output)?;
+    }
     tell(arguments, &report);
     Ok(status::DONE)
 }
@@ -65,9 +78,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
 fn tell(arguments: &Arguments, report: &MergeReport) {
     if arguments.json {
         let mut object = serde_json::to_value(report).expect("a report has only names and numbers");
-        object["format"] = 1.into();
         object["output"] = arguments.output.display().to_string().into();
-        output::line(&object.to_string());
+        output::object(object);
     } else if !arguments.quiet {
         output::line(&format!(
             "{}: {}×{}, {} samples a pixel, of {} parts, {}",

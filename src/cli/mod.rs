@@ -5,6 +5,7 @@
 //! what was complete. Of several images the gravest counts. `compare` and `crosscheck` answer with
 //! 0 agree, 1 differ, 2 cannot compare.
 
+mod batch;
 mod check;
 mod compare;
 mod convert;
@@ -18,9 +19,9 @@ mod relight;
 mod render;
 
 mod available;
-mod batch;
 mod display;
 mod growth;
+mod images;
 mod memory;
 mod output;
 mod overrides;
@@ -35,6 +36,7 @@ mod stop;
 mod summary;
 mod turntable;
 mod verdicts;
+mod version;
 
 use std::process::ExitCode;
 
@@ -42,7 +44,7 @@ use clap::{Parser, Subcommand};
 
 /// Étendue: a CPU ray tracer for Mitsuba 3 scenes and bare meshes.
 #[derive(Debug, Parser)]
-#[command(version, about, after_help = status::HELP, max_term_width = 100)]
+#[command(version = version::text(), about, after_help = status::HELP, max_term_width = 100)]
 struct Arguments {
     #[command(subcommand)]
     command: Command,
@@ -52,6 +54,7 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     Render(Box<render::Arguments>),
+    Batch(batch::Arguments),
     Check(check::Arguments),
     Compare(Box<compare::Arguments>),
     Convert(convert::Arguments),
@@ -75,6 +78,7 @@ pub(crate) fn run() -> ExitCode {
     stop::Stop::instead_of_aborts();
     let result = match Arguments::parse().command {
         Command::Render(arguments) => render::run(&arguments),
+        Command::Batch(arguments) => batch::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Convert(arguments) => convert::run(&arguments),

@@ -133,7 +133,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         if let Some(comparison) = &comparison {
             object["since"] = serde_json::to_value(comparison).expect("and so has a comparison");
         }
-        output::line(&object.to_string());
+        output::object(object);
     } else {
         growth::print(&profile, comparison.as_ref());
     }

@@ -8,7 +8,7 @@ use etendue::error::Error;
 use etendue::render::{Report, human_duration};
 use serde_json::{Value, json};
 
-use super::batch::Item;
+use super::images::Item;
 use super::{output, report, status};
 
 /// How much is told.
@@ -84,7 +84,7 @@ pub(super) fn lost(item: &Item, report: &Report) -> Error {
 /// Tells of one image.
 pub(super) fn tell(style: Style, item: &Item, ending: &Ending, total: Duration) {
     if style.json {
-        return output::line(&object(item, ending, total).to_string());
+        return output::object(object(item, ending, total));
     }
     let Some(report) = ending.report() else {
         return;
@@ -97,7 +97,19 @@ pub(super) fn tell(style: Style, item: &Item, ending: &Ending, total: Duration) 
     }
 }
 
-fn object(item: &Item, ending: &Ending, total: Duration) -> Value {
+/// Tells of an input whose sensors could not be found out, so that none of its images is known.
+pub(super) fn tell_unread(style: Style, input: &str, error: &Error) {
+    if style.json {
+        output::object(json!({
+            "status": "failed",
+            "input": input,
+            "problems": report::json(error.problems()),
+        }));
+    }
+}
+
+/// What became of an image, for programs.
+pub(super) fn object(item: &Item, ending: &Ending, total: Duration) -> Value {
     let mut object = match ending.report() {
         Some(report) => serde_json::to_value(report).expect("a report has only names and numbers"),
         None => json!({}),

@@ -15,11 +15,12 @@
 //!
 //! What follows the pilot is one set of the sampler's as large as is needed, from a ladder of sizes.
 
-use std::convert::Infallible;
 use std::ops::Range;
 
 use super::checkpoint::Keeper;
-use super::options::Adaptive;
+use super::named;
+use super::options::{Adaptive, Options};
+use super::origin::Outcome;
 use super::plan::{Completed, PASS};
 use super::prepare::Job;
 use super::progress::{Phase, Progress};
@@ -167,6 +168,7 @@ pub struct AdaptiveReport {
     /// The noise that was asked for.
     pub noise_threshold: f64,
     /// The fewest and the most samples that a pixel could get, in whole sets.
+    #[serde(serialize_with = "named::range")]
     pub limits: [u32; 2],
     /// Samples a pixel of the crop, on average.
     pub mean_spp: f64,
@@ -183,11 +185,11 @@ fn stream(seed: u64, half: usize, after_pilot: bool, [x, y]: [u32; 2], index: u3
 /// Renders the job's crop, going on from what `keeper` kept, until `progress` asks to stop.
 pub(super) fn render<C: ColorModel>(
     job: &Job<'_, C>,
-    adaptive: &Adaptive,
+    options: (&Options, &Adaptive),
     progress: &dyn Progress,
     mut keeper: Option<&mut Keeper>,
 ) -> Result<(Summed<Blocks>, Completed, Ladder)> {
-    let ladder = Ladder::checked(&job.view.sampler, adaptive)?;
+    let ladder = Ladder::checked(&job.view.sampler, options.1)?;
     let grid = Grid::new(&job.view.film, job.layout().count());
     let passes = ladder.passes() as usize - 1;
     let pilots = grid.tiles();
@@ -208,11 +210,11 @@ pub(super) fn render<C: ColorModel>(
         if let Some(keeper) = &mut keeper {
             keeper.keep_when_due(&summed);
         }
-        Ok::<_, Infallible>(())
+        show(job, options, &ladder, &summed.sums, progress)
     };
-    let Ok(_) = unit::run(first..pilots, progress, &mut add, |tile| {
+    unit::run(first..pilots, progress, &mut add, |tile| {
         pilot(job, &ladder, &grid, tile, progress)
-    });
+    })?;
     if summed.next < pilots {
         let completed = Completed {
             samples: 0,
@@ -238,11 +240,11 @@ pub(super) fn render<C: ColorModel>(
         if let Some(keeper) = &mut keeper {
             keeper.keep_when_due(&summed);
         }
-        Ok::<_, Infallible>(())
+        show(job, options, &ladder, &summed.sums, progress)
     };
-    let Ok(_) = unit::run(pilots + done..units, progress, add, |unit| {
+    unit::run(pilots + done..units, progress, add, |unit| {
         rest.render(job, &ladder, &grid, unit - pilots, progress)
-    });
+    })?;
     let completed = Completed {
         samples: ladder.limits()[0],
         passes: [1 + rest.pass(summed.next - pilots), 1 + rest.passes()],
@@ -266,6 +268,29 @@ fn area(window: &Window) -> u64 {
 
 /// What a unit comes to.
 pub(super) type Part = (Vec<Record>, Tally);
+
+/// Shows the image as it stands, where somebody wants to see it.
+fn show<C: ColorModel>(
+    job: &Job<'_, C>,
+    (options, adaptive): (&Options, &Adaptive),
+    ladder: &Ladder,
+    blocks: &Blocks,
+    progress: &dyn Progress,
+) -> Result<()> {
+    if !progress.wants_picture() {
+        return Ok(());
+    }
+    let (film, limits) = (&job.view.film, ladder.limits());
+    let image = develop(film, &job.layout(), blocks)?;
+    let report = Given::new(film, limits, blocks).report(adaptive.noise_threshold, limits);
+    let outcome = Outcome {
+        spp: report.mean_spp.round() as u32,
+        samples_complete: 0,
+        adaptive: Some(&report),
+    };
+    progress.picture(&job.picture(&options.scene, image, &outcome));
+    Ok(())
+}
 
 /// The pilots of a tile's blocks, and what they decide.
 pub(super) fn pilot<C: ColorModel>(

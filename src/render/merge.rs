@@ -11,8 +11,9 @@ use serde::Serialize;
 
 use super::adaptive::{self, AdaptiveReport, Given};
 use super::memory::{self, Estimate};
-use super::origin::Outcome;
-use super::part::{Head, Piece, Reader, cover};
+use super::origin::{Origin, Outcome};
+use super::part::{Head, Piece, Reader, Tail, cover};
+use super::provenance::Provenance;
 use crate::error::{Error, Problems, Result};
 use crate::film::{Accumulator as _, Blocks, Grid, Record, Sums, Tally};
 use crate::image::{Image, Metadata, Window};
@@ -28,6 +29,8 @@ pub struct Merged {
     pub window: Window,
     /// How the image was made, for the file.
     pub metadata: Metadata,
+    /// What it was made of.
+    pub provenance: Provenance,
     /// What was counted.
     pub report: MergeReport,
 }
@@ -116,7 +119,7 @@ pub fn merge(
     }
     problems.finish()?;
     let image = image.into_inner().expect("no thread panicked");
-    Ok(finish(first, &target, image, &total, parts.len(), began))
+    Ok(finish(&heads, &target, image, &total, began))
 }
 
 /// What rendering the parts of a crop took.
@@ -222,14 +225,14 @@ fn develop(first: &Head, window: sensor::Window, pieces: &[&Piece<'_>]) -> Resul
 }
 
 impl Cost {
-    fn spend(&mut self, tail: super::part::Tail) {
+    fn spend(&mut self, tail: Tail) {
         self.tally.add(&tail.tally);
         self.seconds += tail.seconds;
     }
 }
 
 /// Adds a part's rectangles, some rows at a time.
-fn add_uniform(sums: &mut Sums, mut reader: Reader) -> Result<super::part::Tail> {
+fn add_uniform(sums: &mut Sums, mut reader: Reader) -> Result<Tail> {
     /// Numbers read at a time, but for longer rows.
     const CHUNK: usize = 1 << 15;
     let shown = *sums.window();
@@ -264,7 +267,7 @@ fn add_uniform(sums: &mut Sums, mut reader: Reader) -> Result<super::part::Tail>
 }
 
 /// Adds a part's halves of blocks.
-fn add_adaptive(blocks: &mut Blocks, grid: &Grid, mut reader: Reader) -> Result<super::part::Tail> {
+fn add_adaptive(blocks: &mut Blocks, grid: &Grid, mut reader: Reader) -> Result<Tail> {
     while let Some(at) = reader.place()? {
         let slot = at.place[0] as usize;
         if slot >= 2 * grid.blocks() {
@@ -291,13 +294,13 @@ fn paste(whole: &mut Image, part: &Image, [x, y]: [u32; 2]) {
 }
 
 fn finish(
-    first: &Head,
+    heads: &[Head],
     target: &sensor::Window,
     image: Image,
     total: &Cost,
-    parts: usize,
     began: Instant,
 ) -> Merged {
+    let first = &heads[0];
     let adaptive = first
         .adaptive
         .map(|noise| total.given.report(noise.threshold, noise.limits));
@@ -308,7 +311,17 @@ fn finish(
         samples_complete: adaptive.as_ref().map_or(first.spp, |a| a.limits[0]),
         adaptive: adaptive.as_ref(),
     };
-    let metadata = first.origin.metadata(&outcome);
+    let mut machines: Vec<&str> = heads
+        .iter()
+        .map(|head| head.origin.machine.as_str())
+        .collect();
+    machines.sort_unstable();
+    machines.dedup();
+    let origin = Origin {
+        machine: machines.join("; "),
+        ..first.origin.clone()
+    };
+    let metadata = origin.metadata(&outcome);
     let spp = outcome.spp;
     Merged {
         window: Window {
@@ -318,12 +331,13 @@ fn finish(
             full_height: first.film.height,
         },
         metadata,
+        provenance: Provenance::new(first.fingerprint.clone(), *target),
         report: MergeReport {
             width: image.width(),
             height: image.height(),
             spp,
             adaptive,
-            parts,
+            parts: heads.len(),
             passes: first.all_passes,
             stats: total.tally.stats,
             dropped_samples: total.tally.dropped,

@@ -13,6 +13,9 @@ pub(super) struct Origin {
     pub(super) scene: String,
     pub(super) integrator: String,
     pub(super) seed: u64,
+    /// What it was made on; several where parts were made on several.
+    #[serde(default)]
+    pub(super) machine: String,
     /// Column by column.
     pub(super) world_to_camera: [f32; 16],
     pub(super) world_to_ndc: [f32; 16],
@@ -38,6 +41,7 @@ impl Origin {
             .with("spp", outcome.spp)
             .with("samples_complete", outcome.samples_complete)
             .with("seed", i64::try_from(self.seed).unwrap_or(i64::MAX))
+            .with("machine", self.machine.as_str())
             .with(
                 "world_to_camera",
                 Mat4::from_cols_array(&self.world_to_camera),

@@ -4,8 +4,9 @@
 
 use std::ops::Range;
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
+use super::named;
 use crate::sensor::{Film, Window};
 
 /// Pixels along a tile's side.
@@ -28,6 +29,11 @@ impl Plan {
         let needed = film.shown().grown(film.filter.reach(), &full);
         let tiles = tiles(&full, &needed);
         Self { needed, tiles, spp }
+    }
+
+    /// Samples of each pixel.
+    pub(super) fn spp(&self) -> u32 {
+        self.spp
     }
 
     /// How many units there are.
@@ -93,13 +99,15 @@ impl Plan {
 }
 
 /// How much of a render is done.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Completed {
     /// Samples that every pixel has; those of the pass under way may have up to 16 more.
     pub samples: u32,
     /// Passes over the film that are done, and how many there are.
+    #[serde(serialize_with = "named::progress")]
     pub passes: [u32; 2],
     /// Tiles of all passes that are done, and how many there are.
+    #[serde(serialize_with = "named::progress")]
     pub units: [usize; 2],
 }
 

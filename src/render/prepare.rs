@@ -8,19 +8,20 @@ use std::sync::OnceLock;
 
 use super::black;
 use super::fingerprint::{self, Contents, Fingerprint};
+use super::machine::machine;
 use super::memory::{self, Estimate};
 use super::options::{Colors, Options};
-use super::origin::Origin;
+use super::origin::{Origin, Outcome};
 use super::plan::Completed;
 use super::plugins;
-use super::progress::{Phase, Progress};
+use super::progress::{Phase, Picture, Progress};
 use super::{Report, Seconds, timed};
 use crate::accel::{Build, CacheUse, Method, Recipe};
 use crate::color::ColorModel;
 use crate::description::{Description, Kind, NodeId, Properties};
 use crate::error::{self, Error, Location, Problem, Problems, Result};
 use crate::film::Layout;
-use crate::image::{self, Window};
+use crate::image::{self, Image, Window};
 use crate::integrator::{self, Estimator, Footprint, Integrator};
 use crate::mesh::ReadMesh;
 use crate::sampler::Sampler;
@@ -270,7 +271,7 @@ impl Ask<'_> {
 
 /// How many rays a film of so many samples a pixel takes, as a rule: paths of three bounces that each ask
 /// for light.
-fn rays(film: &Film, samples: u32) -> u64 {
+pub(super) fn rays(film: &Film, samples: u32) -> u64 {
     const A_SAMPLE: u64 = 6;
     let pixels = u64::from(film.crop.width) * u64::from(film.crop.height);
     pixels.saturating_mul(u64::from(samples) * A_SAMPLE)
@@ -454,7 +455,7 @@ fn integrator_at(description: &Description, error: Error) -> Error {
 }
 
 /// The channels of samples.
-fn layout<C: ColorModel>(color: &C, integrator: &Integrator<C>) -> Layout {
+pub(super) fn layout<C: ColorModel>(color: &C, integrator: &Integrator<C>) -> Layout {
     Layout::new(color.channels(), integrator.extra_channels())
 }
 
@@ -520,6 +521,15 @@ impl<C: ColorModel> Job<'_, C> {
         }
     }
 
+    /// The image of a render that goes on.
+    pub(super) fn picture(&self, scene: &str, image: Image, outcome: &Outcome<'_>) -> Picture {
+        Picture {
+            image,
+            window: self.window(),
+            metadata: self.origin(scene).metadata(outcome),
+        }
+    }
+
     /// What the image is of.
     pub(super) fn origin(&self, scene: &str) -> Origin {
         let View { sensor, .. } = &self.view;
@@ -528,6 +538,7 @@ impl<C: ColorModel> Job<'_, C> {
             scene: scene.to_owned(),
             integrator: self.view.integrator_name.clone(),
             seed: self.seed,
+            machine: machine(),
             world_to_camera: to_camera.to_cols_array(),
             world_to_ndc: (sensor.projection() * to_camera).to_cols_array(),
         }

@@ -11,13 +11,14 @@ use super::adaptive::{self, AdaptiveReport, Ladder};
 use super::black;
 use super::checkpoint::Keeper;
 use super::heat::{self, Heat};
-use super::options::{Adaptive, Colors, Options, Overrides};
+use super::options::{Adaptive, Colors, Options};
 use super::origin::Outcome;
 use super::part::{self, Head, Made, Noise, Passes};
 use super::pinned;
 use super::plan::{Completed, Plan};
 use super::prepare::{self, Ask, Facts, Job, Shelf, View};
 use super::progress::Progress;
+use super::provenance::{self, Provenance};
 use super::uniform;
 use super::{Parted, Rendered, Report, timed};
 use crate::color::{Bands, ColorModel, Rgb};
@@ -105,8 +106,10 @@ impl Task for Render<'_> {
             tally,
             adaptive,
         } = timed(&mut seconds.render, || match &options.adaptive {
-            None => Finished::uniform(&job, progress, keeper.as_mut()),
-            Some(adaptive) => Finished::adaptive(&job, adaptive, progress, keeper.as_mut()),
+            None => Finished::uniform(&job, options, progress, keeper.as_mut()),
+            Some(adaptive) => {
+                Finished::adaptive(&job, (options, adaptive), progress, keeper.as_mut())
+            }
         })?;
         let mut warnings = job.warnings.clone();
         if let Some(keeper) = &keeper {
@@ -123,8 +126,20 @@ impl Task for Render<'_> {
         if completed.units[0] > 0 {
             warnings.extend(black::black(&job, description, &image));
         }
+        let provenance = match options.recorded && completed.is_whole() {
+            true => {
+                let film = &job.view.film;
+                let whole = provenance::without_crop(description, film);
+                Some(Provenance::new(
+                    job.fingerprint(&whole, options)?,
+                    film.crop,
+                ))
+            }
+            false => None,
+        };
         let rendered = Rendered {
             image,
+            provenance,
             window: job.window(),
             metadata: job.origin(&options.scene).metadata(&Outcome {
                 spp: report.spp,
@@ -165,13 +180,7 @@ impl Task for Part<'_> {
             Some((_, ladder)) => ladder.passes(),
             None => Plan::new(film, spp).passes(),
         };
-        // The fingerprint is that of the whole film, whatever the crop.
-        let mut whole = description.clone();
-        let overrides = Overrides {
-            crop: Some(film.full()),
-            ..Overrides::default()
-        };
-        overrides.apply(&mut whole);
+        let whole = provenance::without_crop(description, film);
         let head = Head {
             fingerprint: job.fingerprint(&whole, options)?,
             target: part::target(),
@@ -237,10 +246,11 @@ struct Finished {
 impl Finished {
     fn uniform<C: ColorModel>(
         job: &Job<'_, C>,
+        options: &Options,
         progress: &dyn Progress,
         mut keeper: Option<&mut Keeper>,
     ) -> Result<Self> {
-        let (summed, completed) = uniform::render(job, progress, keeper.as_deref_mut())?;
+        let (summed, completed) = uniform::render(job, options, progress, keeper.as_deref_mut())?;
         if let Some(keeper) = keeper {
             keeper.finish(&summed, completed.is_whole());
         }
@@ -256,12 +266,12 @@ impl Finished {
 
     fn adaptive<C: ColorModel>(
         job: &Job<'_, C>,
-        adaptive: &Adaptive,
+        options: (&Options, &Adaptive),
         progress: &dyn Progress,
         mut keeper: Option<&mut Keeper>,
     ) -> Result<Self> {
         let (summed, completed, ladder) =
-            adaptive::render(job, adaptive, progress, keeper.as_deref_mut())?;
+            adaptive::render(job, options, progress, keeper.as_deref_mut())?;
         if let Some(keeper) = keeper {
             keeper.finish(&summed, completed.is_whole());
         }
@@ -275,7 +285,7 @@ impl Finished {
             tally,
             adaptive: Some(
                 adaptive::Given::new(&job.view.film, ladder.limits(), blocks)
-                    .report(adaptive.noise_threshold, ladder.limits()),
+                    .report(options.1.noise_threshold, ladder.limits()),
             ),
         })
     }

@@ -3,6 +3,7 @@
 
 mod support;
 
+mod batch;
 mod channels;
 mod cli;
 mod closed_form;
@@ -25,4 +26,5 @@ mod phong;
 mod profile;
 mod resume;
 mod same_bits;
+mod signs;
 mod tour;

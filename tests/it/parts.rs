@@ -215,6 +215,35 @@ fn what_is_missing_doubled_damaged_or_of_another_image_is_named_and_nothing_is_w
 }
 
 #[test]
+fn a_part_that_is_there_is_rendered_again_if_it_is_damaged_or_another_and_only_then() {
+    let place = Place::new();
+    let status = |words: &str| -> String {
+        let command = "render scene.xml -q --json -o a.part --skip-same --size 20x20";
+        let output = place.succeed(&format!("{command} {words}"));
+        let told: Value = serde_json::from_slice(&output.stdout).expect("an object");
+        told["status"].as_str().expect("a word").to_owned()
+    };
+    for words in [
+        "--spp 20 --passes 1:2",
+        "--spp 20 --passes 1:3",
+        "--spp 20 --crop 0,0,9,9",
+        "--spp 20 --crop 0,0,9,8",
+        "--spp 20 --seed 2",
+        "--noise-threshold 0.1 --max-spp 99 --passes 0:1",
+        "--spp 20",
+    ] {
+        assert_eq!(status(words), "rendered", "{words}");
+        assert_eq!(status(words), "skipped", "{words}");
+    }
+    let whole = fs::read(place.path("a.part")).unwrap();
+    fs::write(place.path("a.part"), &whole[..whole.len() - 3]).unwrap();
+    assert_eq!(status("--spp 20"), "rendered");
+    fs::write(place.path("scene.xml"), SCENE.replace("constant", "point")).unwrap();
+    assert_eq!(status("--spp 20"), "rendered");
+    assert_eq!(status("--spp 20"), "skipped");
+}
+
+#[test]
 fn every_byte_of_a_parts_head_and_records_may_be_wrong() {
     let place = Place::new();
     place.succeed("render scene.xml -q -o a.part --spp 2 --size 9x5 --passes 0:1");

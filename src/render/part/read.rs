@@ -107,6 +107,22 @@ impl Reader {
         }
     }
 
+    /// Reads all of it, to make sure that it is as it was written; the answer is what it says of itself.
+    pub(in super::super) fn examine(mut self) -> Result<Head> {
+        /// Numbers read at a time.
+        const CHUNK: usize = 1 << 15;
+        let mut numbers = Vec::new();
+        while let Some(place) = self.place()? {
+            for first in (0..place.count).step_by(CHUNK) {
+                numbers.resize(CHUNK.min(place.count - first), 0.0);
+                self.numbers(&mut numbers)?;
+            }
+        }
+        let head = self.head.clone();
+        self.finish()?;
+        Ok(head)
+    }
+
     /// The error for a file that is not what was written.
     pub(in super::super) fn damaged(&self, why: &str) -> Error {
         damaged(&self.path, why)
