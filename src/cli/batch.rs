@@ -81,6 +81,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     let worker = Worker {
         folder: &manifest.folder,
         told: arguments.progress,
+        memory: arguments.memory.words(),
         retries: arguments.retries,
         stop: &stop,
     };

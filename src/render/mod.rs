@@ -121,6 +121,7 @@ pub struct Report {
     /// Samples that were not finite and were dropped.
     pub dropped_samples: u64,
     /// One of their pixels.
+    #[serde(serialize_with = "named::pixel")]
     pub dropped_pixel: Option<[u32; 2]>,
     /// Seconds by phase. What a session had in memory took none, and a resumed render all of its runs.
     pub seconds: Seconds,

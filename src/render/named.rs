@@ -42,6 +42,22 @@ pair!(
     corners, min, max
 );
 
+pair!(
+    /// A pixel's column and row.
+    place, x, y
+);
+
+/// A pixel's column and row, if there is one.
+pub(super) fn pixel<S: Serializer>(
+    pixel: &Option<[u32; 2]>,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    match pixel {
+        Some(pixel) => place(pixel, serializer),
+        None => serializer.serialize_none(),
+    }
+}
+
 /// The corners of a box, if there is one.
 pub(super) fn bounds<S: Serializer>(
     bounds: &Option<[[f32; 3]; 2]>,

@@ -133,6 +133,12 @@ fn what_fails_is_told_and_keeps_nothing_else_from_being_rendered() {
     }
     let text = String::from_utf8(place.run("").stdout).unwrap();
     assert!(text.contains("5 skipped, 4 failed"), "{text}");
+    fs::remove_file(place.path("out/large.exr")).unwrap();
+    let report = place.report("--memory-limit 1k", 1);
+    let message = report["images"][8]["problems"][0]["message"]
+        .as_str()
+        .unwrap();
+    assert!(message.contains("limit of 1.0 kB"), "{message}");
 }
 
 #[test]

@@ -109,6 +109,8 @@ pub(super) struct Worker<'a> {
     /// From which files are named.
     pub(super) folder: &'a Path,
     pub(super) told: Told,
+    /// The option for the memory of each process.
+    pub(super) memory: Option<String>,
     pub(super) retries: u32,
     pub(super) stop: &'a Stop,
 }
@@ -167,6 +169,7 @@ impl Worker<'_> {
             .arg("-o")
             .arg(&unit.item.output)
             .args(["--skip-same", "--quiet", "--json", "--progress", told])
+            .args(&self.memory)
             .current_dir(self.folder)
             .stdin(Stdio::null())
             .stdout(Stdio::piped());
