@@ -4,6 +4,7 @@
 mod bar;
 mod events;
 mod plain;
+mod steps;
 
 use std::io::IsTerminal;
 use std::sync::Mutex;
@@ -17,6 +18,7 @@ use super::output;
 use super::stop::Stop;
 
 pub(super) use events::emit;
+pub(super) use steps::StepLines;
 
 /// How progress is told.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
