@@ -54,7 +54,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
                 "problems": report::json(problems),
                 "warnings": report::json(warnings),
             });
-            output::line(&object.to_string());
+            output::object(object);
         }
         match &result {
             Err(error) => {

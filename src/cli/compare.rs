@@ -201,9 +201,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         Err(error) => {
             if arguments.json {
                 let problems = report::json(error.problems());
-                output::line(
-                    &json!({ "verdict": "cannot compare", "problems": problems }).to_string(),
-                );
+                output::object(json!({ "verdict": "cannot compare", "problems": problems }));
             } else {
                 report::error(&error);
             }
@@ -214,7 +212,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         let mut object = outcome.object;
         object["verdict"] = if outcome.agrees { "agree" } else { "differ" }.into();
         object["sentence"] = outcome.sentence.into();
-        output::line(&object.to_string());
+        output::object(object);
     } else if !arguments.quiet {
         outcome.lines.iter().for_each(|line| output::line(line));
         output::line(&outcome.sentence);

@@ -142,7 +142,7 @@ fn write(arguments: &Arguments, output: &Path, image: &Image, metadata: Metadata
             "height": image.height(),
             "channels": image.channels(),
         });
-        output::line(&object.to_string());
+        output::object(object);
     }
     Ok(())
 }

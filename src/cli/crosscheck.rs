@@ -10,6 +10,7 @@ use etendue::error::{Error, Result};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::overrides::ImageArguments;
+use super::progress::StepLines;
 use super::scene::ReadArguments;
 use super::stop::Stop;
 use super::verdicts::{self, Ending, Style};
@@ -257,14 +258,16 @@ pub(super) fn serve() -> Result<u8> {
     Ok(status::DONE)
 }
 
-/// A progress bar over the images of a scene.
+/// Progress over the images of a scene: a bar on a terminal, else lines.
 struct Bar<'a> {
     bar: ProgressBar,
+    lines: StepLines,
+    name: &'a str,
     stop: &'a Stop,
 }
 
 impl<'a> Bar<'a> {
-    fn new(name: &str, quiet: bool, stop: &'a Stop) -> Self {
+    fn new(name: &'a str, quiet: bool, stop: &'a Stop) -> Self {
         let target = if quiet {
             ProgressDrawTarget::hidden()
         } else {
@@ -274,7 +277,12 @@ impl<'a> Bar<'a> {
         let template = "{prefix} [{bar:30}] {pos}/{len} images, {msg}";
         bar.set_style(ProgressStyle::with_template(template).expect("the template is right"));
         bar.set_prefix(name.to_owned());
-        Self { bar, stop }
+        Self {
+            bar,
+            lines: StepLines::new(quiet),
+            name,
+            stop,
+        }
     }
 }
 
@@ -283,6 +291,9 @@ impl Watch for Bar<'_> {
         self.bar.set_length(total.into());
         self.bar.set_position(done.into());
         self.bar.set_message(format!("{side} at work"));
+        let name = self.name;
+        self.lines
+            .say(|| format!("{name}: {done} of {total} images, {side} at work"));
     }
 
     fn stop(&self) -> bool {

@@ -8,7 +8,7 @@ use etendue::error::Result;
 use etendue::image::{self, Encoding, Picture};
 use etendue::mesh::{self, Per, ReadOptions};
 use etendue::render::{Options, SceneInfo, Session, Silent};
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 use super::memory::RunArguments;
 use super::overrides::{self, ImageArguments};
@@ -52,7 +52,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         };
         if arguments.json {
             object["file"] = input.display().to_string().into();
-            output::line(&object.to_string());
+            output::object(object);
         } else {
             output::line(&input.display().to_string());
             print(&object, 1);
@@ -136,7 +136,7 @@ fn mesh_file(arguments: &Arguments, input: &Path) -> Result<Value> {
         "normals": !mesh.normals.is_empty(),
         "texture_coordinates": !mesh.uvs.is_empty(),
         "attributes": attributes,
-        "bounds": bounds,
+        "bounds": bounds.map(|[min, max]| json!({ "min": min, "max": max })),
         "area": mesh.area(),
         "geometry_bytes": mesh.bytes(),
     }))
@@ -176,7 +176,7 @@ fn picture(picture: &Picture) -> Value {
         .collect();
     json!({
         "kind": "image",
-        "size": [image.width(), image.height()],
+        "size": { "width": image.width(), "height": image.height() },
         "encoding": match picture.encoding {
             Encoding::Linear => "linear",
             Encoding::Srgb => "sRGB",
@@ -195,7 +195,7 @@ pub(super) fn print(value: &Value, level: usize) {
     for (name, value) in object {
         let label = format!("{}{}", "  ".repeat(level), name.replace('_', " "));
         match value {
-            Value::Object(inner) if !inner.is_empty() => {
+            Value::Object(inner) if !inner.is_empty() && pair(inner).is_none() => {
                 output::line(&label);
                 print(value, level + 1);
             }
@@ -215,6 +215,14 @@ pub(super) fn print(value: &Value, level: usize) {
     }
 }
 
+/// Two numbers or corners that need no names for people.
+fn pair(object: &Map<String, Value>) -> Option<String> {
+    let names = [("width", "height", ", "), ("min", "max", " to ")];
+    let (a, b, between) = names.into_iter().find(|(a, ..)| object.contains_key(*a))?;
+    let (a, b) = (object.get(a)?, object.get(b)?);
+    (object.len() == 2).then(|| format!("{}{between}{}", text(a), text(b)))
+}
+
 /// A value on one line.
 fn text(value: &Value) -> String {
     match value {
@@ -227,12 +235,9 @@ fn text(value: &Value) -> String {
         Value::Number(number) => number.to_string(),
         Value::String(text) => text.clone(),
         Value::Array(values) if values.is_empty() => "none".to_owned(),
-        Value::Array(values) if values.iter().any(Value::is_array) => {
-            let corners: Vec<String> = values.iter().map(text).collect();
-            corners.join(" to ")
-        }
         Value::Array(values) => values.iter().map(text).collect::<Vec<_>>().join(", "),
         Value::Object(object) if object.is_empty() => "none".to_owned(),
+        Value::Object(object) if pair(object).is_some() => pair(object).unwrap_or_default(),
         Value::Object(object) => {
             let title = ["name", "id", "path"]
                 .into_iter()

@@ -29,6 +29,14 @@ pub(super) struct RunArguments {
 }
 
 impl MemoryArguments {
+    /// The option as it was given, for another call of the command.
+    pub(super) fn words(&self) -> Option<String> {
+        self.memory_limit.map(|limit| match limit {
+            u64::MAX => "--memory-limit=none".to_owned(),
+            bytes => format!("--memory-limit={bytes}"),
+        })
+    }
+
     /// What may be taken. Ask before anything is loaded, for what is loaded counts as taken.
     pub(super) fn budget(&self) -> Budget {
         Budget::new(limit(self.memory_limit))

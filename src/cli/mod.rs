@@ -5,12 +5,14 @@
 //! what was complete. Of several images the gravest counts. `compare` and `crosscheck` answer with
 //! 0 agree, 1 differ, 2 cannot compare.
 
+mod batch;
 mod check;
 mod color;
 mod compare;
 mod convert;
 mod crosscheck;
 mod info;
+mod merge;
 mod mesh;
 mod plugins;
 mod profile;
@@ -19,9 +21,9 @@ mod render;
 mod spectrum;
 
 mod available;
-mod batch;
 mod display;
 mod growth;
+mod images;
 mod memory;
 mod output;
 mod overrides;
@@ -36,6 +38,7 @@ mod stop;
 mod summary;
 mod turntable;
 mod verdicts;
+mod version;
 
 use std::process::ExitCode;
 
@@ -43,7 +46,7 @@ use clap::{Parser, Subcommand};
 
 /// Étendue: a CPU ray tracer for Mitsuba 3 scenes and bare meshes.
 #[derive(Debug, Parser)]
-#[command(version, about, after_help = status::HELP, max_term_width = 100)]
+#[command(version = version::text(), about, after_help = status::HELP, max_term_width = 100)]
 struct Arguments {
     #[command(subcommand)]
     command: Command,
@@ -53,12 +56,14 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     Render(Box<render::Arguments>),
+    Batch(batch::Arguments),
     Check(check::Arguments),
     Color(color::Arguments),
     Compare(Box<compare::Arguments>),
     Convert(convert::Arguments),
     Crosscheck(Box<crosscheck::Arguments>),
     Info(info::Arguments),
+    Merge(merge::Arguments),
     Mesh(mesh::Arguments),
     Plugins(plugins::Arguments),
     Profile(Box<profile::Arguments>),
@@ -77,12 +82,14 @@ pub(crate) fn run() -> ExitCode {
     stop::Stop::instead_of_aborts();
     let result = match Arguments::parse().command {
         Command::Render(arguments) => render::run(&arguments),
+        Command::Batch(arguments) => batch::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
         Command::Color(arguments) => color::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Convert(arguments) => convert::run(&arguments),
         Command::Crosscheck(arguments) => crosscheck::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
+        Command::Merge(arguments) => merge::run(&arguments),
         Command::Mesh(arguments) => mesh::run(&arguments),
         Command::Plugins(arguments) => plugins::run(&arguments),
         Command::Profile(arguments) => profile::run(&arguments),

@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use etendue::error::{Error, Result};
-use etendue::{file, image};
+use etendue::{file, image, render};
+use serde_json::Value;
 
 /// What the placeholders of a pattern stand for.
 #[derive(Clone, Copy, Debug)]
@@ -119,7 +120,10 @@ pub(super) fn check_writable<'a>(outputs: impl Iterator<Item = &'a Path>) -> Res
     let mut tried = HashSet::new();
     for output in outputs {
         if tried.insert((output.parent(), output.extension())) || output.exists() {
-            image::check_writable(output)?;
+            match render::is_part(output) {
+                true => render::check_part_writable(output)?,
+                false => image::check_writable(output)?,
+            }
         }
     }
     Ok(())
@@ -138,6 +142,27 @@ pub(super) fn line(text: &str) {
         }
         _ => {}
     }
+}
+
+/// The version of what is printed for programs: it changes where a name that was there changes its meaning or goes.
+const FORMAT: u32 = 1;
+
+/// An object for programs, which says the version of its names, if it has none of its own.
+pub(super) fn formatted(mut object: Value) -> Value {
+    if object["format"].is_null() {
+        object["format"] = FORMAT.into();
+    }
+    object
+}
+
+/// An object for programs as a line on standard output.
+pub(super) fn object(object: Value) {
+    line(&formatted(object).to_string());
+}
+
+/// A line on standard error, whose reader may have gone away.
+pub(super) fn note(text: &str) {
+    let _ = writeln!(io::stderr(), "{text}");
 }
 
 /// What went wrong with standard output, if anything did.

@@ -6,6 +6,7 @@ use std::thread;
 use clap::builder::RangedI64ValueParser;
 use etendue::color::Space;
 use etendue::relight::Weight;
+use etendue::render::Passes;
 use etendue::sampler::MAX_SAMPLES;
 use etendue::sensor::Window;
 use glam::DVec3;
@@ -59,6 +60,21 @@ pub(super) fn part(text: &str) -> Parsed<f32> {
     let part: Option<f32> = text.parse().ok();
     part.filter(|part| (0.0..=1.0).contains(part))
         .ok_or_else(|| "write a number from 0 to 1".to_owned())
+}
+
+/// `2:4`, `2:`, `:4`
+pub(super) fn passes(text: &str) -> Parsed<Passes> {
+    const HOW: &str = "write it as FIRST:END, such as 0:2 or 2:";
+    let (first, end) = text.split_once(':').ok_or(HOW)?;
+    let number = |text: &str| match text.trim() {
+        "" => Ok(None),
+        text => text.parse::<u32>().map(Some).map_err(|_| HOW),
+    };
+    let (first, end) = (number(first)?.unwrap_or(0), number(end)?);
+    if end.is_some_and(|end| end <= first) {
+        return Err("there is no pass in it: END is the first that is left out".to_owned());
+    }
+    Ok(Passes { first, end })
 }
 
 /// `1,-2,0.5`

@@ -27,9 +27,6 @@ pub(super) struct Arguments {
     markdown: bool,
 }
 
-/// The number of the JSON's form: it grows when a field changes its meaning.
-const FORMAT: u32 = 1;
-
 /// Runs the command; the answer is the exit status.
 pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     let all = plugins();
@@ -55,7 +52,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     }
     if arguments.json {
         let shown: Vec<Value> = whole.iter().chain(&chosen).map(|p| object(p)).collect();
-        output::line(&json!({ "format": FORMAT, "plugins": shown }).to_string());
+        output::object(json!({ "plugins": shown }));
     } else if arguments.markdown {
         output::line(&page(whole.iter().chain(&chosen).copied()));
     } else {

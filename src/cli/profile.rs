@@ -13,6 +13,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::memory::MemoryArguments;
 use super::overrides::MethodArguments;
+use super::progress::StepLines;
 use super::scene::SceneArguments;
 use super::stop::Stop;
 use super::{growth, output, parse, status};
@@ -133,7 +134,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         if let Some(comparison) = &comparison {
             object["since"] = serde_json::to_value(comparison).expect("and so has a comparison");
         }
-        output::line(&object.to_string());
+        output::object(object);
     } else {
         growth::print(&profile, comparison.as_ref());
     }
@@ -168,9 +169,10 @@ fn write(folder: &Path, profile: &Profile, comparison: Option<&Comparison>) -> R
     Ok(())
 }
 
-/// Progress on standard error, where that is a terminal.
+/// Progress on standard error: a bar on a terminal, else lines.
 struct Bar {
     bar: ProgressBar,
+    lines: StepLines,
     stop: Stop,
 }
 
@@ -187,7 +189,11 @@ impl Bar {
         let bar = ProgressBar::with_draw_target(Some(STEPS as u64), target);
         let template = "profiling [{bar:30}] {percent:>3} % {msg}, {eta} left";
         bar.set_style(ProgressStyle::with_template(template).expect("the template is right"));
-        Self { bar, stop }
+        Self {
+            bar,
+            lines: StepLines::new(quiet),
+            stop,
+        }
     }
 }
 
@@ -195,6 +201,9 @@ impl Watch for Bar {
     fn at(&self, what: &str, part: f64) {
         self.bar.set_position((part * STEPS) as u64);
         self.bar.set_message(what.to_owned());
+        let percent = 100.0 * part;
+        self.lines
+            .say(|| format!("profiling: {percent:.0} %, {what}"));
     }
 
     fn stop(&self) -> bool {

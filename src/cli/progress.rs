@@ -1,101 +1,278 @@
-//! A progress bar on standard error, where that is a terminal; and the way by which a signal or a time
-//! limit reaches the render.
+//! Signs of life on standard error: a bar, lines of text or events for programs. And the way by which a signal, a time
+//! limit or the wish to see the image as it stands reaches the render.
 
+mod bar;
+mod events;
+mod plain;
+mod steps;
+
+use std::io::IsTerminal;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-use etendue::render::{Phase, Progress};
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use clap::ValueEnum;
+use etendue::render::{Phase, Picture, Progress};
 
+use super::output;
 use super::stop::Stop;
 
-/// Shows the phases of one render after another.
-pub(super) struct Bar {
-    bar: ProgressBar,
-    name: String,
-    rays: AtomicU64,
-    samples: AtomicU64,
-    /// When the phase began, and when its rates were last shown.
-    clock: Mutex<(Instant, Instant)>,
-    stop: Stop,
-    /// Whether it was said that the render is coming to an end.
-    said: AtomicBool,
+pub(super) use events::emit;
+pub(super) use steps::StepLines;
+
+/// How progress is told.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum Told {
+    /// A bar on a terminal, else plain lines
+    Auto,
+    /// A bar, where standard error is a terminal
+    Bar,
+    /// A line after ten seconds; more as they pass and five per cent more are done, one a minute at least
+    Plain,
+    /// An event a line, as JSON: see docs/progress.md
+    Json,
+    /// Not at all
+    None,
 }
 
-impl Bar {
-    /// For the render called `name`; hidden where `quiet`, and where standard error is no terminal.
-    pub(super) fn new(name: &str, quiet: bool, stop: Stop) -> Self {
-        let target = if quiet {
-            ProgressDrawTarget::hidden()
-        } else {
-            ProgressDrawTarget::stderr_with_hz(5)
-        };
-        Self {
-            bar: ProgressBar::with_draw_target(Some(0), target),
-            name: name.to_owned(),
-            rays: AtomicU64::new(0),
-            samples: AtomicU64::new(0),
-            clock: Mutex::new((Instant::now(), Instant::now())),
-            stop,
-            said: AtomicBool::new(false),
+#[derive(Debug)]
+enum Show {
+    Bar(bar::Bar),
+    Plain(plain::Lines),
+    Json,
+    Nothing,
+}
+
+impl Show {
+    fn new(told: Told) -> Self {
+        match told {
+            Told::Auto if std::io::stderr().is_terminal() => Self::Bar(bar::Bar::new()),
+            Told::Auto | Told::Plain => Self::Plain(plain::Lines::new()),
+            Told::Bar => Self::Bar(bar::Bar::new()),
+            Told::Json => Self::Json,
+            Told::None => Self::Nothing,
         }
     }
 
-    /// Takes the bar away.
-    pub(super) fn finish(&self) {
-        self.bar.finish_and_clear();
+    /// The time between two looks at where a render is.
+    fn refresh(&self) -> Duration {
+        Duration::from_millis(match self {
+            Self::Bar(_) => 200,
+            _ => 1000,
+        })
     }
 }
 
-/// How often the rates are computed.
-const REFRESH: Duration = Duration::from_millis(200);
+/// Where a phase is.
+#[derive(Clone, Copy, Debug)]
+struct State<'a> {
+    /// Of the render.
+    name: &'a str,
+    phase: Phase,
+    /// Steps.
+    done: u64,
+    total: u64,
+    /// Steps of an earlier run, which went on from there.
+    kept: u64,
+    rays: u64,
+    /// Since the phase began.
+    elapsed: Duration,
+}
 
-impl Progress for Bar {
+impl State<'_> {
+    /// What is done, in [0, 1].
+    fn share(&self) -> f64 {
+        (self.done as f64 / self.total.max(1) as f64).min(1.0)
+    }
+
+    /// Steps and rays a second.
+    fn rates(&self) -> [f64; 2] {
+        let seconds = self.elapsed.as_secs_f64().max(1e-9);
+        [self.done.saturating_sub(self.kept), self.rays].map(|count| count as f64 / seconds)
+    }
+
+    /// The time that the rest will take, as it goes.
+    fn left(&self) -> Option<Duration> {
+        let [rate, _] = self.rates();
+        let left = self.total.saturating_sub(self.done) as f64 / rate;
+        Duration::try_from_secs_f64(left).ok()
+    }
+}
+
+/// When the phase began, and when it was last shown.
+#[derive(Debug)]
+struct Clock {
+    phase: Option<Phase>,
+    total: u64,
+    began: Instant,
+    shown: Instant,
+}
+
+/// Writes the image as it stands.
+pub(super) type Write<'a> = Box<dyn Fn(&Picture) + Sync + 'a>;
+
+/// Watches one render.
+pub(super) struct Watch<'a> {
+    show: Show,
+    name: String,
+    done: AtomicU64,
+    kept: AtomicU64,
+    rays: AtomicU64,
+    clock: Mutex<Clock>,
+    stop: Stop,
+    /// Whether it was said that the render is coming to an end.
+    said: AtomicBool,
+    /// The time between two pictures of the image as it stands, and when the last was made.
+    every: Option<Duration>,
+    pictured: Mutex<Instant>,
+    write: Write<'a>,
+}
+
+impl<'a> Watch<'a> {
+    /// For the render called `name`; `write` writes its image as it stands, every so often and where a signal asks for it.
+    pub(super) fn new(
+        name: &str,
+        told: Told,
+        stop: Stop,
+        every: Option<Duration>,
+        write: Write<'a>,
+    ) -> Self {
+        let now = Instant::now();
+        Self {
+            show: Show::new(told),
+            name: name.to_owned(),
+            done: AtomicU64::new(0),
+            kept: AtomicU64::new(0),
+            rays: AtomicU64::new(0),
+            clock: Mutex::new(Clock {
+                phase: None,
+                total: 0,
+                began: now,
+                shown: now,
+            }),
+            stop,
+            said: AtomicBool::new(false),
+            every,
+            pictured: Mutex::new(now),
+            write,
+        }
+    }
+
+    fn state(&self, clock: &Clock) -> Option<State<'_>> {
+        Some(State {
+            name: &self.name,
+            phase: clock.phase?,
+            done: self.done.load(Ordering::Relaxed),
+            total: clock.total,
+            kept: self.kept.load(Ordering::Relaxed),
+            rays: self.rays.load(Ordering::Relaxed),
+            elapsed: clock.began.elapsed(),
+        })
+    }
+
+    /// Nothing more is shown.
+    pub(super) fn finish(&self) {
+        if let Show::Bar(bar) = &self.show {
+            bar.finish();
+        }
+    }
+}
+
+const CALM: &str = "no thread panics while it looks at the clock";
+
+impl Progress for Watch<'_> {
     fn begin(&self, phase: Phase, total: u64) {
-        let (verb, template) = match phase {
-            Phase::Load => ("loading", "{prefix} [{bar:30}] {pos}/{len} shapes"),
-            Phase::Build => ("building", "{prefix} {elapsed}"),
-            Phase::Render => (
-                "rendering",
-                "{prefix} [{bar:30}] {percent:>3} % {msg}, {eta} left",
-            ),
+        let mut clock = self.clock.lock().expect(CALM);
+        if let (Show::Json, Some(before)) = (&self.show, self.state(&clock)) {
+            events::over(before.name, before.phase, before.elapsed, before.done);
+        }
+        for counter in [&self.done, &self.kept, &self.rays] {
+            counter.store(0, Ordering::Relaxed);
+        }
+        let now = Instant::now();
+        *clock = Clock {
+            phase: Some(phase),
+            total,
+            began: now,
+            shown: now,
         };
-        self.bar.reset();
-        self.bar.set_length(total);
-        self.bar.set_prefix(format!("{verb} {}", self.name));
-        self.bar
-            .set_style(ProgressStyle::with_template(template).expect("the template is right"));
-        *self
-            .clock
-            .lock()
-            .expect("no thread panics while it reads the clock") = (Instant::now(), Instant::now());
+        match (&self.show, self.state(&clock)) {
+            (Show::Bar(bar), Some(state)) => bar.begin(&state),
+            (Show::Plain(lines), _) => lines.begin(),
+            _ => {}
+        }
     }
 
     fn advance(&self, steps: u64, rays: u64) {
-        self.bar.inc(steps);
-        let rays = self.rays.fetch_add(rays, Ordering::Relaxed) + rays;
-        let samples = self.samples.fetch_add(steps, Ordering::Relaxed) + steps;
+        self.done.fetch_add(steps, Ordering::Relaxed);
+        self.rays.fetch_add(rays, Ordering::Relaxed);
+        if rays == 0 {
+            self.kept.fetch_add(steps, Ordering::Relaxed);
+        }
         let Ok(mut clock) = self.clock.try_lock() else {
             return;
         };
-        if clock.1.elapsed() > REFRESH {
-            clock.1 = Instant::now();
-            let rate = |n: u64| n as f64 / clock.0.elapsed().as_secs_f64() * 1e-6;
-            self.bar.set_message(format!(
-                "{:.2} M samples/s, {:.2} M rays/s",
-                rate(samples),
-                rate(rays)
-            ));
+        if clock.shown.elapsed() < self.show.refresh() {
+            return;
+        }
+        clock.shown = Instant::now();
+        let Some(state) = self.state(&clock) else {
+            return;
+        };
+        match &self.show {
+            Show::Bar(bar) => bar.advance(&state),
+            Show::Plain(lines) => lines.advance(&state),
+            Show::Json => events::advance(&state),
+            Show::Nothing => {}
         }
     }
 
     fn stop(&self) -> bool {
         let asked = self.stop.asked();
         if asked && self.stop.signalled() && !self.said.swap(true, Ordering::Relaxed) {
-            self.bar
-                .println("finishing the tiles under way; a second signal ends at once");
+            let text = "finishing the tiles under way; a second signal ends at once";
+            match &self.show {
+                Show::Bar(bar) => bar.say(text),
+                Show::Plain(_) => output::note(text),
+                Show::Json | Show::Nothing => {}
+            }
         }
         asked
+    }
+
+    fn wants_picture(&self) -> bool {
+        if self.stop.take_wish() {
+            return true;
+        }
+        let pictured = self.pictured.lock().expect(CALM);
+        self.every.is_some_and(|every| pictured.elapsed() >= every)
+    }
+
+    fn picture(&self, picture: &Picture) {
+        (self.write)(picture);
+        *self.pictured.lock().expect(CALM) = Instant::now();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_an_earlier_run_did_is_no_part_of_the_rate_and_what_is_left_follows_from_it() {
+        let state = State {
+            name: "a",
+            phase: Phase::Render,
+            done: 600,
+            total: 1000,
+            kept: 500,
+            rays: 50,
+            elapsed: Duration::from_secs(10),
+        };
+        assert_eq!(state.rates(), [10.0, 5.0]);
+        assert_eq!(state.left(), Some(Duration::from_secs(40)));
+        assert_eq!(state.share(), 0.6);
+        let begun = State { done: 500, ..state };
+        assert_eq!(begun.left(), None);
     }
 }

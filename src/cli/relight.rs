@@ -75,7 +75,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
             "weights": weights.collect::<Value>(),
             "output": arguments.output.as_ref().map(|o| o.display().to_string()),
         });
-        output::line(&object.to_string());
+        output::object(object);
     } else if arguments.output.is_none() {
         for layer in layers {
             let [r, g, b] = relight::mean(&image, &layer);

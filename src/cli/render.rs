@@ -12,16 +12,18 @@ use etendue::display;
 use etendue::error::{Error, Problem, Result};
 use etendue::image;
 use etendue::render::{
-    Adaptive, Checkpoint, Options, Overrides, Progress, Rendered, Session, is_mesh, sensors,
+    Adaptive, Checkpoint, Options, Outline, Overrides, Passes, Picture, Progress, Rendered,
+    Session, is_current, is_mesh, is_part, outline, sensors,
 };
 use glam::DVec3;
+use serde_json::json;
 
-use super::batch::{Batch, Item, Request};
 use super::display::DisplayArguments;
+use super::images::{Images, Item, Request};
 use super::memory::{RUN, RunArguments};
 use super::overrides::{IMAGE, ImageArguments};
 use super::parse::{self, Frames};
-use super::progress::Bar;
+use super::progress::{self, Told, Watch};
 use super::scene::SceneArguments;
 use super::staging::StagingArguments;
 use super::stop::Stop;
@@ -33,7 +35,7 @@ use super::{output, report, status};
 ///
 /// INPUT is a Mitsuba 3 scene (.xml) or a bare mesh (.ply, .obj), which gets an automatic camera on a
 /// ground under a soft sky. The extension of OUT says the format: .exr (linear, float32, with metadata and
-/// all channels), .hdr (linear) or .png (sRGB).
+/// all channels), .hdr (linear), .png (sRGB), or .part: the sums that `etendue merge` makes images of.
 ///
 /// Ctrl-C, SIGTERM and SIGHUP end a render early: the tiles under way are finished and the image of what
 /// is complete is written. A second signal ends the process at once.
@@ -84,6 +86,15 @@ pub(super) struct Arguments {
     /// Leave out images whose file is there, unless a checkpoint lies beside it
     #[arg(long, help_heading = SERIES)]
     skip_existing: bool,
+    /// Write OUT.fingerprint beside each image, which says what it was made of, and leave out what is there, undamaged, of
+    /// the same scene, files, settings and version. A part says it itself
+    #[arg(long, conflicts_with = "skip_existing", help_heading = SERIES)]
+    skip_same: bool,
+
+    /// Render only these passes, into a .part file that `etendue merge` puts together with the others: the first has
+    /// one sample a pixel, the second 15, each that follows 16. Of adaptive sampling the first is the pilots
+    #[arg(long, value_name = "FIRST:END", value_parser = parse::passes, help_heading = SERIES)]
+    passes: Option<Passes>,
 
     /// Stop an image after so many seconds, and write what is complete
     #[arg(long, value_name = "SECONDS", value_parser = parse::seconds, help_heading = RUN)]
@@ -94,6 +105,9 @@ pub(super) struct Arguments {
     /// Go on from OUT.checkpoint where it is there, to the same image as without interruption
     #[arg(long, help_heading = RUN)]
     resume: bool,
+    /// Write the image as it stands every so many seconds; the signal SIGUSR1 asks for it too
+    #[arg(long, value_name = "SECONDS", value_parser = parse::seconds, help_heading = RUN)]
+    snapshot: Option<Duration>,
     #[command(flatten)]
     run: RunArguments,
     /// How rays find shapes; the image is the same
@@ -108,9 +122,12 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "DIR", help_heading = RUN)]
     cache: Option<PathBuf>,
 
-    /// No progress bar, no summary, no warnings
+    /// No progress, no summary, no warnings
     #[arg(short, long, help_heading = TELL)]
     quiet: bool,
+    /// How progress is told on standard error
+    #[arg(long, value_enum, value_name = "HOW", default_value_t = Told::Auto, help_heading = TELL)]
+    progress: Told,
     /// Print a JSON object for each image: size, counts, seconds
     #[arg(long, help_heading = TELL)]
     json: bool,
@@ -166,7 +183,7 @@ enum Work {
 }
 
 impl Arguments {
-    fn options(&self, item: &Item) -> Options {
+    pub(super) fn options(&self, item: &Item) -> Options {
         let checkpoint = Checkpoint {
             path: item.checkpoint(),
             every: self.checkpoint,
@@ -195,7 +212,40 @@ impl Arguments {
             cache: self.cache.clone(),
             sensor: item.sensor,
             pinned: false,
+            recorded: self.skip_same,
             checkpoint: (self.checkpoint.is_some() || self.resume).then_some(checkpoint),
+        }
+    }
+
+    /// Refuses what cannot go together.
+    fn check(&self) -> Result<()> {
+        if let Some(least) = self.min_spp.filter(|least| *least > self.max_spp) {
+            let message = format!("--min-spp {least} is more than --max-spp {}", self.max_spp);
+            return Err(Error::input(message));
+        }
+        let of_whole = [
+            (self.time_limit.is_some(), "--time-limit"),
+            (self.checkpoint.is_some(), "--checkpoint"),
+            (self.resume, "--resume"),
+            (self.heatmap.is_some(), "--heatmap"),
+            (self.snapshot.is_some(), "--snapshot"),
+        ];
+        let is_part = is_part(Path::new(&self.output));
+        match of_whole.into_iter().find(|(given, _)| *given) {
+            Some((_, option)) if is_part => {
+                let message = format!("{option} is for images, and {} is a part", self.output);
+                Err(Error::input(message)
+                    .help("a part is whole or not there: make it smaller by --crop or --passes"))
+            }
+            _ if self.passes.is_some() && !is_part => {
+                let message = format!(
+                    "--passes makes a part of an image, and {} is an image",
+                    self.output
+                );
+                Err(Error::input(message)
+                    .help("name the output .part, and give all parts to etendue merge"))
+            }
+            _ => Ok(()),
         }
     }
 
@@ -211,7 +261,16 @@ impl Arguments {
         self.skip_existing && item.output.exists() && !item.checkpoint().exists()
     }
 
-    fn batch(&self, budget: &Budget) -> Result<Batch> {
+    /// How progress is told.
+    fn told(&self) -> Told {
+        match self.progress {
+            Told::Auto if self.quiet => Told::None,
+            told => told,
+        }
+    }
+
+    /// The images of this call.
+    pub(super) fn images(&self, budget: &Budget) -> Result<Images> {
         let request = Request {
             inputs: &self.inputs,
             frames: self.frames.or(self.turntable.map(Frames::first)),
@@ -221,38 +280,28 @@ impl Arguments {
             scene: &self.scene,
             budget,
         };
-        request.batch()
+        request.images()
     }
 }
 
 /// Runs the command; the answer is the exit status.
 pub(super) fn run(arguments: &Arguments) -> Result<u8> {
-    if let Some(least) = arguments.min_spp.filter(|least| *least > arguments.max_spp) {
-        let message = format!(
-            "--min-spp {least} is more than --max-spp {}",
-            arguments.max_spp
-        );
-        return Err(Error::input(message));
-    }
+    arguments.check()?;
     let stop = Stop::on_signals()?;
+    stop.hear_wishes()?;
     let budget = arguments.run.memory.budget_until(&stop);
-    let Batch { items, failed } = arguments.batch(&budget)?;
+    let Images { items, failed } = arguments.images(&budget)?;
     output::check_distinct((items.iter()).flat_map(|i| i.files().map(|file| (file, i.name()))))?;
     let wanted = items.iter().filter(|item| !arguments.skips(item));
     output::check_writable(wanted.flat_map(Item::files))?;
-    let mut series = Series {
-        arguments,
-        session: Session::default(),
-        read: None,
-        budget,
-        told: Vec::new(),
-        stop,
-    };
+    let mut series = Series::new(arguments, budget, stop);
     let style = arguments.style();
     let mut endings = Vec::new();
     for (input, error) in failed {
-        report::error(&error);
-        endings.push((input.display().to_string(), Ending::Failed(error)));
+        series.fail(&error);
+        let name = input.display().to_string();
+        summary::tell_unread(style, &name, &error);
+        endings.push((name, Ending::Failed(error)));
     }
     for item in &items {
         let begin = Instant::now();
@@ -269,21 +318,39 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
                     Ending::NotBegun
                 }
                 Err(error) => {
-                    report::error(&error);
+                    series.fail(&error);
                     Ending::Failed(error)
                 }
             }
         };
         summary::tell(style, item, &ending, begin.elapsed());
+        series.event("image", || summary::object(item, &ending, begin.elapsed()));
         endings.push((item.output.display().to_string(), ending));
     }
     if endings.len() > 1 {
         summary::table(style, &endings);
     }
     let signalled = series.stop.signalled();
+    let status = summary::status(&endings, signalled);
+    series.event(
+        "done",
+        || json!({ "images": endings.len(), "status": status }),
+    );
     // The process ends: the system takes the scene back at once, faster than piece by piece.
     std::mem::forget(series);
-    Ok(summary::status(&endings, signalled))
+    Ok(status)
+}
+
+/// Writes the image as it stands. If that fails the render goes on: the end will show whether it still does.
+fn snapshot(item: &Item, picture: &Picture, display: &display::DisplayTransform) {
+    let Picture {
+        image,
+        window,
+        metadata,
+    } = picture;
+    if let Err(error) = display::save_window(&item.output, image, window, metadata, display) {
+        report::warnings(error.problems());
+    }
 }
 
 /// Images, one after another.
@@ -299,7 +366,51 @@ struct Series<'a> {
     stop: Stop,
 }
 
-impl Series<'_> {
+/// What is known of an image before it is rendered.
+#[derive(Clone, Debug)]
+pub(super) struct Looked {
+    pub(super) outline: Outline,
+    /// Whether it is there, of the same scene, files, settings and version.
+    pub(super) current: bool,
+}
+
+/// Looks at an image without rendering it. Its scene is loaded only where the camera's place depends on it and there is
+/// an image that may be it.
+pub(super) fn look(
+    arguments: &Arguments,
+    item: &Item,
+    budget: Budget,
+    stop: &Stop,
+) -> Result<Looked> {
+    arguments.check()?;
+    let mut series = Series::new(arguments, budget, stop.clone());
+    let options = arguments.options(item);
+    let (_, description) = series.read(item)?;
+    let outline = outline(&description, &options)?;
+    let mut current = false;
+    if item.output.exists() {
+        let nothing = Box::new(|_: &Picture| ());
+        let watch = Watch::new(&item.name(), Told::None, stop.clone(), None, nothing);
+        let posed = series.pose(item, &description, &options, &watch)?;
+        let seen = posed.as_ref().unwrap_or(&description);
+        let passes = arguments.passes.unwrap_or_default();
+        current = is_current(seen, &options, passes, &item.output)?;
+    }
+    Ok(Looked { outline, current })
+}
+
+impl<'a> Series<'a> {
+    fn new(arguments: &'a Arguments, budget: Budget, stop: Stop) -> Self {
+        Self {
+            arguments,
+            session: Session::default(),
+            read: None,
+            budget,
+            told: Vec::new(),
+            stop,
+        }
+    }
+
     fn item(&mut self, item: &Item) -> Result<Ending> {
         let arguments = self.arguments;
         let deadline = arguments.time_limit.map(|limit| Instant::now() + limit);
@@ -312,23 +423,49 @@ impl Series<'_> {
                 path.display()
             )));
         }
+        self.event(
+            "started",
+            || json!({ "name": item.name(), "output": item.output.display().to_string() }),
+        );
         let read = self.read(item)?;
-        let bar = Bar::new(&item.name(), arguments.quiet, stop);
-        let rendered = self.look(item, read, &options, &bar);
+        let display = arguments.display.transform();
+        let write = Box::new(|picture: &Picture| snapshot(item, picture, &display));
+        let bar = Watch::new(
+            &item.name(),
+            arguments.told(),
+            stop,
+            arguments.snapshot,
+            write,
+        );
+        let posed = self.pose(item, &read.1, &options, &bar);
+        let seen = posed.and_then(|posed| {
+            let seen = posed.as_ref().unwrap_or(&read.1);
+            let passes = arguments.passes.unwrap_or_default();
+            if arguments.skip_same && is_current(seen, &options, passes, &item.output)? {
+                return Ok(Ending::Skipped);
+            }
+            match is_part(&item.output) {
+                true => self.part(item, seen, &options, &bar),
+                false => self.image(item, seen, &options, &bar),
+            }
+        });
         bar.finish();
-        let rendered = rendered?;
-        self.finish(item, &options, rendered)
+        if seen.is_ok() && is_mesh(&item.input) {
+            let (as_read, description) = read;
+            self.read = Some((item.input.clone(), as_read, description));
+        }
+        seen
     }
 
-    /// Renders the description, from where the turntable has turned the camera, and keeps it.
-    fn look(
+    /// The description at the item's time and from where the turntable has turned the camera, where that is another.
+    fn pose(
         &mut self,
         item: &Item,
-        (as_read, description): (description::Options, Description),
+        description: &Description,
         options: &Options,
-        bar: &Bar,
-    ) -> Result<Rendered> {
-        let sensor = sensors(&description).get(item.sensor).copied();
+        bar: &Watch<'_>,
+    ) -> Result<Option<Description>> {
+        let sensor = sensors(description).get(item.sensor).copied();
         let turned = self.arguments.turntable.zip(item.frame).zip(sensor);
         let mut posed = None;
         let shutter = self.arguments.image.shutter(item.frame.unwrap_or(0));
@@ -340,9 +477,9 @@ impl Series<'_> {
             overrides.apply(posed.insert(description.clone()));
         }
         if let Some(((count, frame), sensor)) = turned {
-            let bounds = self.session.bounds(&description, options, bar)?;
+            let bounds = self.session.bounds(description, options, bar)?;
             let pivot = self.arguments.pivot;
-            let center = pivot.unwrap_or_else(|| turntable::pivot(&description, sensor, &bounds));
+            let center = pivot.unwrap_or_else(|| turntable::pivot(description, sensor, &bounds));
             let speed = self.arguments.image.fps() / f64::from(count);
             let orbit = Orbit {
                 center,
@@ -367,16 +504,44 @@ impl Series<'_> {
                 posed.set(*shape, "times", Value::String(times));
             }
         }
-        let seen = posed.as_ref().unwrap_or(&description);
-        let mut rendered = self.session.render(seen, options, bar);
-        if let (Some(path), Ok(_), false) = (&item.heatmap, &rendered, bar.stop()) {
-            let drawn = self.heatmap(seen, path, options, bar);
-            rendered = rendered.and_then(|rendered| drawn.map(|()| rendered));
+        Ok(posed)
+    }
+
+    /// Renders an image and writes it.
+    fn image(
+        &mut self,
+        item: &Item,
+        seen: &Description,
+        options: &Options,
+        bar: &Watch<'_>,
+    ) -> Result<Ending> {
+        let rendered = self.session.render(seen, options, bar)?;
+        if let (Some(path), false) = (&item.heatmap, bar.stop()) {
+            self.heatmap(seen, path, options, bar)?;
         }
-        if is_mesh(&item.input) {
-            self.read = Some((item.input.clone(), as_read, description));
+        bar.finish();
+        self.finish(item, options, rendered)
+    }
+
+    /// Renders a part, which is written if it is whole.
+    fn part(
+        &mut self,
+        item: &Item,
+        seen: &Description,
+        options: &Options,
+        bar: &Watch<'_>,
+    ) -> Result<Ending> {
+        let passes = self.arguments.passes.unwrap_or_default();
+        let parted = (self.session).render_part(seen, options, passes, &item.output, bar)?;
+        bar.finish();
+        for problem in &parted.warnings {
+            self.warn_of(problem);
         }
-        rendered
+        if parted.report.completed.is_whole() {
+            return Ok(Ending::Rendered(parted.report));
+        }
+        self.warn(&summary::lost(item, &parted.report));
+        Ok(Ending::NotBegun)
     }
 
     /// When a bare glTF file's animation is looked at, as `times` are written; `None` where it has none, or nobody asks
@@ -408,7 +573,7 @@ impl Series<'_> {
         description: &Description,
         path: &Path,
         options: &Options,
-        bar: &Bar,
+        bar: &Watch<'_>,
     ) -> Result<()> {
         let heat = self.session.heat(description, options, bar)?;
         if bar.stop() {
@@ -466,10 +631,14 @@ impl Series<'_> {
             window,
             metadata,
             report,
+            provenance,
             ..
         } = rendered;
         let display = self.arguments.display.transform();
         display::save_window(&item.output, &image, &window, &metadata, &display)?;
+        if let Some(provenance) = provenance {
+            provenance.write(&item.output)?;
+        }
         if completed.is_whole() {
             if let Some(checkpoint) = &options.checkpoint {
                 checkpoint.remove();
@@ -492,9 +661,38 @@ impl Series<'_> {
 
     /// Says a warning once in a series.
     fn warn_of(&mut self, problem: &Problem) {
-        if !self.arguments.quiet && !self.told.contains(problem) {
+        if self.told.contains(problem) {
+            return;
+        }
+        if self.arguments.told() == Told::Json {
+            self.problem("warning", problem);
+        } else if !self.arguments.quiet {
             report::warnings(std::slice::from_ref(problem));
-            self.told.push(problem.clone());
+        }
+        self.told.push(problem.clone());
+    }
+
+    /// Says why an image is not there.
+    fn fail(&self, error: &Error) {
+        if self.arguments.told() == Told::Json {
+            let problems = error.problems().iter();
+            return problems.for_each(|problem| self.problem("error", problem));
+        }
+        report::error(error);
+    }
+
+    fn problem(&self, severity: &str, problem: &Problem) {
+        self.event("problem", || {
+            let mut object = report::object(problem);
+            object["severity"] = severity.into();
+            object
+        });
+    }
+
+    /// Says what happens to programs that want to hear it.
+    fn event(&self, name: &str, about: impl FnOnce() -> serde_json::Value) {
+        if self.arguments.told() == Told::Json {
+            progress::emit(name, about());
         }
     }
 }

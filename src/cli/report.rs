@@ -24,6 +24,11 @@ pub(super) fn warnings(problems: &[Problem]) {
 
 /// Problems for programs: an array of objects.
 pub(super) fn json(problems: &[Problem]) -> serde_json::Value {
+    problems.iter().map(object).collect()
+}
+
+/// A problem for programs.
+pub(super) fn object(problem: &Problem) -> serde_json::Value {
     let place = |location: &Location| {
         serde_json::json!({
             "file": location.file.display().to_string(),
@@ -31,8 +36,7 @@ pub(super) fn json(problems: &[Problem]) -> serde_json::Value {
             "column": location.column,
         })
     };
-    let object = |problem: &Problem| {
-        serde_json::json!({
+    serde_json::json!({
             "kind": match problem.kind {
                 Kind::Input => "input",
                 Kind::Unsupported => "unsupported",
@@ -44,9 +48,7 @@ pub(super) fn json(problems: &[Problem]) -> serde_json::Value {
             "related": problem.related.as_ref().map(|(location, what)| {
                 serde_json::json!({ "what": what, "location": place(location) })
             }),
-        })
-    };
-    problems.iter().map(object).collect()
+    })
 }
 
 fn print(problems: &[Problem], level: Level<'static>) {

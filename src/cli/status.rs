@@ -6,6 +6,8 @@ use etendue::error::{Error, Kind};
 pub(super) const DONE: u8 = 0;
 /// The input is wrong or asks for what Étendue lacks.
 pub(super) const INPUT: u8 = 1;
+/// The command line is wrong: clap's own.
+pub(super) const USAGE: u8 = 2;
 /// Compared images differ.
 pub(super) const DIFFERS: u8 = 1;
 /// Images cannot be compared.

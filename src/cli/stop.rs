@@ -20,6 +20,8 @@ use super::status;
 #[derive(Clone, Debug, Default)]
 pub(super) struct Stop {
     signalled: Arc<AtomicBool>,
+    /// Set by SIGUSR1: the image is to be seen as it stands.
+    wish: Arc<AtomicBool>,
     deadline: Option<Instant>,
 }
 
@@ -39,6 +41,7 @@ impl Stop {
         }
         Ok(Self {
             signalled,
+            wish: Arc::default(),
             deadline: None,
         })
     }
@@ -73,8 +76,21 @@ impl Stop {
     pub(super) fn by(&self, deadline: Option<Instant>) -> Self {
         Self {
             signalled: self.signalled.clone(),
+            wish: self.wish.clone(),
             deadline,
         }
+    }
+
+    /// Listens to SIGUSR1, where there is such a signal.
+    pub(super) fn hear_wishes(&self) -> Result<()> {
+        #[cfg(unix)]
+        flag::register(signal_hook::consts::SIGUSR1, self.wish.clone()).map_err(refused)?;
+        Ok(())
+    }
+
+    /// Whether there was a wish to see the image as it stands, which is none any more.
+    pub(super) fn take_wish(&self) -> bool {
+        self.wish.load(Ordering::Relaxed) && self.wish.swap(false, Ordering::Relaxed)
     }
 
     /// Set once a signal came.

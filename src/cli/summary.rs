@@ -8,7 +8,7 @@ use etendue::error::Error;
 use etendue::render::{Report, human_duration};
 use serde_json::{Value, json};
 
-use super::batch::Item;
+use super::images::Item;
 use super::{output, report, status};
 
 /// How much is told.
@@ -72,10 +72,19 @@ pub(super) fn incomplete(item: &Item, report: &Report) -> Error {
     Error::input(message)
 }
 
+/// The warning that a part is not there, for it was stopped.
+pub(super) fn lost(item: &Item, report: &Report) -> Error {
+    let [tiles, of_tiles] = report.completed.units;
+    Error::input(format!(
+        "{} is not written: {tiles} of {of_tiles} tiles were done, and a part is whole or not there",
+        item.output.display()
+    ))
+}
+
 /// Tells of one image.
 pub(super) fn tell(style: Style, item: &Item, ending: &Ending, total: Duration) {
     if style.json {
-        return output::line(&object(item, ending, total).to_string());
+        return output::object(object(item, ending, total));
     }
     let Some(report) = ending.report() else {
         return;
@@ -88,7 +97,19 @@ pub(super) fn tell(style: Style, item: &Item, ending: &Ending, total: Duration) 
     }
 }
 
-fn object(item: &Item, ending: &Ending, total: Duration) -> Value {
+/// Tells of an input whose sensors could not be found out, so that none of its images is known.
+pub(super) fn tell_unread(style: Style, input: &str, error: &Error) {
+    if style.json {
+        output::object(json!({
+            "status": "failed",
+            "input": input,
+            "problems": report::json(error.problems()),
+        }));
+    }
+}
+
+/// What became of an image, for programs.
+pub(super) fn object(item: &Item, ending: &Ending, total: Duration) -> Value {
     let mut object = match ending.report() {
         Some(report) => serde_json::to_value(report).expect("a report has only names and numbers"),
         None => json!({}),
@@ -112,7 +133,10 @@ fn object(item: &Item, ending: &Ending, total: Duration) -> Value {
 fn line(path: &Path, report: &Report, total: Duration) {
     let [width, height] = report.size;
     let samples = match &report.adaptive {
-        None => format!("{} samples a pixel", report.completed.samples),
+        None => match &report.passes {
+            None => format!("{} samples a pixel", report.completed.samples),
+            Some(passes) => format!("passes {}:{}", passes.start, passes.end),
+        },
         Some(adaptive) => {
             let (mean, [least, most]) = (adaptive.mean_spp, adaptive.limits);
             let mut samples = format!("{mean:.1} samples a pixel, {least} to {most}");

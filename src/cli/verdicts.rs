@@ -108,7 +108,7 @@ impl Ending {
 /// Tells of one scene.
 pub(super) fn tell(style: Style, scene: &str, ending: &Ending) {
     if style.json {
-        return output::line(&object(scene, ending).to_string());
+        return output::object(object(scene, ending));
     }
     if style.quiet && matches!(ending.kind, Kind::Agree | Kind::Timed) {
         return;

@@ -139,6 +139,21 @@ impl Record {
         &mut self.numbers[1]
     }
 
+    /// The step of the budget's ladder that the half takes.
+    pub(crate) fn step(&self) -> f64 {
+        self.numbers[1]
+    }
+
+    /// All of it: its head and its sums.
+    pub(crate) fn numbers(&self) -> &[f64] {
+        &self.numbers
+    }
+
+    /// The same, to be filled with what was kept.
+    pub(crate) fn numbers_mut(&mut self) -> &mut [f64] {
+        &mut self.numbers
+    }
+
     /// The sums over [`Grid::reach`].
     pub(crate) fn sums_mut(&mut self) -> &mut [f64] {
         &mut self.numbers[HEAD..]
@@ -189,6 +204,11 @@ impl Blocks {
             grid,
             tally: Tally::default(),
         })
+    }
+
+    /// The numbers of each half of each block.
+    pub(crate) fn records(&self) -> impl Iterator<Item = &[f64]> {
+        self.numbers.chunks_exact(self.grid.record())
     }
 
     fn record(&self, slot: usize) -> &[f64] {

@@ -2,9 +2,11 @@
 
 use std::ops::Range;
 
+use serde::{Deserialize, Serialize};
+
 /// Names of a sample's channels: red, green and blue, other colours of the colour model, what the integrator adds, and
 /// opacity.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Layout {
     names: Vec<String>,
     /// How many are colours.
@@ -22,6 +24,11 @@ impl Layout {
             names,
             colors: count,
         }
+    }
+
+    /// Whether it is one that [`Layout::new`] may have made: what was read from a file need not be.
+    pub(crate) fn is_sound(&self) -> bool {
+        self.colors >= 3 && self.names.len() > self.colors
     }
 
     /// How many channels there are.

@@ -172,6 +172,11 @@ impl Sums {
         })
     }
 
+    /// The pixels that they are of.
+    pub(crate) fn window(&self) -> &Window {
+        &self.window
+    }
+
     /// Adds samples of a pixel, whose values stand in a row a channel, in all pixels of the window that their filter
     /// reaches.
     pub(crate) fn splat(
@@ -204,6 +209,28 @@ impl Sums {
             }
         }
     }
+    /// The sums of the pixels that are in `window` too: which these are, and a run a row.
+    pub(crate) fn rows_within(
+        &self,
+        window: &Window,
+    ) -> (Window, impl Iterator<Item = &[f64]> + Clone) {
+        let seen = self.window.grown(0, window);
+        let stride = self.layout.count() + 1;
+        let (left, top) = (
+            seen.x.saturating_sub(self.window.x) as usize,
+            seen.y.saturating_sub(self.window.y) as usize,
+        );
+        let rows = self.data.chunks_exact(self.window.width as usize * stride);
+        let rows = rows.skip(top);
+        let rows = rows.take(if seen.width > 0 {
+            seen.height as usize
+        } else {
+            0
+        });
+        let count = seen.width as usize * stride;
+        (seen, rows.map(move |row| &row[left * stride..][..count]))
+    }
+
     /// Adds the sums of another part of the film, without what they cost.
     pub(crate) fn add_film(&mut self, other: &Self) {
         self.add_rectangle(&other.window, &other.data, 1.0);

@@ -7,7 +7,7 @@ use crate::error::Result;
 use crate::lanes::Lanes;
 
 /// Half a pixel to each side.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Box;
 
 impl Box {

@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::lanes::{Lanes, exp};
 
 /// A truncated Gaussian.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Gaussian {
     stddev: f32,
     /// The bell where it is cut off.

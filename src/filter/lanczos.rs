@@ -9,7 +9,7 @@ use crate::error::Result;
 use crate::lanes::{Lanes, sin_cos};
 
 /// A windowed sinc.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Lanczos {
     lobes: f32,
 }

@@ -7,7 +7,7 @@ use crate::error::Result;
 use crate::lanes::Lanes;
 
 /// A cubic of radius 2.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Mitchell {
     b: f32,
     c: f32,

@@ -19,7 +19,7 @@ pub trait Kernel: std::fmt::Debug + Send + Sync {
 
 family! {
     /// Every reconstruction filter there is.
-    #[derive(Clone, Debug)]
+    #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
     pub enum Filter: Kernel, context () {
         "box" => Box(r#box::Box),
         "catmullrom" => CatmullRom(catmullrom::CatmullRom),

@@ -7,7 +7,7 @@ use crate::error::Result;
 use crate::lanes::Lanes;
 
 /// A triangle.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Tent {
     radius: f32,
 }

@@ -6,7 +6,6 @@ use std::num::NonZeroUsize;
 use std::time::Instant;
 
 use super::axis::{Axis, Effort};
-use super::machine;
 use super::noise::Loops;
 use super::subject::{Stage, Subject};
 use super::sweep::{Extent, Setting, Sweep};
@@ -14,7 +13,7 @@ use super::{FORMAT, Fit, Growth, Point, Profile, Series, scaling, verdict};
 use crate::accel::Build;
 use crate::budget::Budget;
 use crate::error::{Error, Result};
-use crate::render::{Colors, Options, Overrides, Report, Seconds, Session, Silent};
+use crate::render::{Colors, Options, Overrides, Report, Seconds, Session, Silent, machine};
 
 /// What to profile, and how.
 #[derive(Clone, Debug)]
@@ -151,7 +150,7 @@ pub fn run(settings: &Settings, watch: &dyn Watch) -> Result<Option<Profile>> {
         format: FORMAT,
         version: env!("CARGO_PKG_VERSION").to_owned(),
         subject: settings.subject.name(),
-        machine: machine::name(),
+        machine: machine(),
         effort: settings.effort,
         rounds: complete,
         seconds: begin.elapsed().as_secs_f64(),

@@ -6,7 +6,6 @@
 
 mod axis;
 mod fit;
-mod machine;
 mod measure;
 mod noise;
 mod quantity;

@@ -15,8 +15,12 @@
 //!
 //! What follows the pilot is one set of the sampler's as large as is needed, from a ladder of sizes.
 
+use std::ops::Range;
+
 use super::checkpoint::Keeper;
-use super::options::Adaptive;
+use super::named;
+use super::options::{Adaptive, Options};
+use super::origin::Outcome;
 use super::plan::{Completed, PASS};
 use super::prepare::Job;
 use super::progress::{Phase, Progress};
@@ -24,13 +28,15 @@ use super::samples::{self, Sink};
 use super::unit;
 use crate::color::{ColorModel, luminance};
 use crate::error::{Error, Result};
-use crate::film::{Blocks, GROUP, Grid, Group, Record, Summed, Sums, Tally};
+use crate::film::{
+    Accumulator as _, Blocks, GROUP, Grid, Group, Layout, Record, Summed, Sums, Tally,
+};
 use crate::filter::Filter;
 use crate::image::Image;
 use crate::lanes::Kernel;
 use crate::math::random;
 use crate::sampler::{Sampler, Stream};
-use crate::sensor::Window;
+use crate::sensor::{Film, Window};
 
 /// Sets in a half's pilot.
 const SETS: u32 = 4;
@@ -91,6 +97,23 @@ impl Ladder {
         }
     }
 
+    /// The same, unless the sampler's sets tell nothing of the noise.
+    pub(super) fn checked(sampler: &Sampler, adaptive: &Adaptive) -> Result<Self> {
+        let ladder = Self::new(sampler, adaptive);
+        match ladder.repeats_itself() {
+            false => Ok(ladder),
+            true => Err(Error::input(
+                "the sampler's points are the same in every set, so that their spread tells nothing of the noise",
+            )
+            .help("take another --sampler, or --spp in place of --noise-threshold")),
+        }
+    }
+
+    /// How many passes there are at most: the pilots, and those after them.
+    pub(super) fn passes(&self) -> u32 {
+        1 + self.limits()[1].div_ceil(2 * PASS)
+    }
+
     /// Whether all sets of the pilot are the same points, in whatever order, so that their spread tells
     /// nothing: those of `grid`, and of `stratified` without jitter.
     fn repeats_itself(&self) -> bool {
@@ -145,6 +168,7 @@ pub struct AdaptiveReport {
     /// The noise that was asked for.
     pub noise_threshold: f64,
     /// The fewest and the most samples that a pixel could get, in whole sets.
+    #[serde(serialize_with = "named::range")]
     pub limits: [u32; 2],
     /// Samples a pixel of the crop, on average.
     pub mean_spp: f64,
@@ -161,19 +185,13 @@ fn stream(seed: u64, half: usize, after_pilot: bool, [x, y]: [u32; 2], index: u3
 /// Renders the job's crop, going on from what `keeper` kept, until `progress` asks to stop.
 pub(super) fn render<C: ColorModel>(
     job: &Job<'_, C>,
-    adaptive: &Adaptive,
+    options: (&Options, &Adaptive),
     progress: &dyn Progress,
     mut keeper: Option<&mut Keeper>,
 ) -> Result<(Summed<Blocks>, Completed, Ladder)> {
-    let ladder = Ladder::new(&job.view.sampler, adaptive);
-    if ladder.repeats_itself() {
-        return Err(Error::input(
-            "the sampler's points are the same in every set, so that their spread tells nothing of the noise",
-        )
-        .help("take another --sampler, or --spp in place of --noise-threshold"));
-    }
+    let ladder = Ladder::checked(&job.view.sampler, options.1)?;
     let grid = Grid::new(&job.view.film, job.layout().count());
-    let passes = ladder.limits()[1].div_ceil(2 * PASS) as usize;
+    let passes = ladder.passes() as usize - 1;
     let pilots = grid.tiles();
     let mut summed = Summed {
         sums: Blocks::new(grid)?,
@@ -182,18 +200,21 @@ pub(super) fn render<C: ColorModel>(
     if let Some(keeper) = &mut keeper {
         keeper.resume(&mut summed, pilots * (1 + passes))?;
     }
-    let pixels = |block: usize| {
-        let own = grid.block(block);
-        u64::from(own.width) * u64::from(own.height)
+    progress.begin(Phase::Render, pilot_samples(&grid, &ladder, 0..pilots));
+    let done = pilots.min(summed.next);
+    progress.advance(pilot_samples(&grid, &ladder, 0..done), 0);
+    let first = summed.next;
+    let mut add = |part: Part| {
+        summed.sums.add(&part);
+        summed.next += 1;
+        if let Some(keeper) = &mut keeper {
+            keeper.keep_when_due(&summed);
+        }
+        show(job, options, &ladder, &summed.sums, progress)
     };
-
-    let begun = u64::from(2 * ladder.begun());
-    let of_tile = |tile: usize| grid.tile(tile).map(pixels).sum::<u64>() * begun;
-    progress.begin(Phase::Render, (0..pilots).map(of_tile).sum());
-    progress.advance((0..pilots.min(summed.next)).map(of_tile).sum(), 0);
-    let mut summed = unit::run(pilots, summed, progress, keeper.as_deref_mut(), |tile| {
+    unit::run(first..pilots, progress, &mut add, |tile| {
         pilot(job, &ladder, &grid, tile, progress)
-    });
+    })?;
     if summed.next < pilots {
         let completed = Completed {
             samples: 0,
@@ -210,22 +231,20 @@ pub(super) fn render<C: ColorModel>(
             "the checkpoint knows of more tiles than there are",
         ));
     }
-    let of_unit = |unit: usize| {
-        let slots = rest.slots(&grid, unit);
-        slots
-            .map(|(slot, indices)| pixels(slot / 2) * indices.len() as u64)
-            .sum::<u64>()
-    };
     let done = summed.next - pilots;
-    let of_slot = |(slot, count): (usize, &u32)| pixels(slot / 2) * u64::from(*count);
-    progress.begin(
-        Phase::Render,
-        rest.counts.iter().enumerate().map(of_slot).sum(),
-    );
-    progress.advance((0..done).map(of_unit).sum(), 0);
-    summed = unit::run(units, summed, progress, keeper, |unit| {
+    progress.begin(Phase::Render, rest.samples(&grid, 0..rest.units()));
+    progress.advance(rest.samples(&grid, 0..done), 0);
+    let add = |part: Part| {
+        summed.sums.add(&part);
+        summed.next += 1;
+        if let Some(keeper) = &mut keeper {
+            keeper.keep_when_due(&summed);
+        }
+        show(job, options, &ladder, &summed.sums, progress)
+    };
+    unit::run(pilots + done..units, progress, add, |unit| {
         rest.render(job, &ladder, &grid, unit - pilots, progress)
-    });
+    })?;
     let completed = Completed {
         samples: ladder.limits()[0],
         passes: [1 + rest.pass(summed.next - pilots), 1 + rest.passes()],
@@ -234,14 +253,53 @@ pub(super) fn render<C: ColorModel>(
     Ok((summed, completed, ladder))
 }
 
+/// How many samples the pilots of tiles take.
+pub(super) fn pilot_samples(grid: &Grid, ladder: &Ladder, tiles: Range<usize>) -> u64 {
+    let pixels: u64 = tiles
+        .flat_map(|tile| grid.tile(tile))
+        .map(|block| area(&grid.block(block)))
+        .sum();
+    pixels * u64::from(2 * ladder.begun())
+}
+
+fn area(window: &Window) -> u64 {
+    u64::from(window.width) * u64::from(window.height)
+}
+
+/// What a unit comes to.
+pub(super) type Part = (Vec<Record>, Tally);
+
+/// Shows the image as it stands, where somebody wants to see it.
+fn show<C: ColorModel>(
+    job: &Job<'_, C>,
+    (options, adaptive): (&Options, &Adaptive),
+    ladder: &Ladder,
+    blocks: &Blocks,
+    progress: &dyn Progress,
+) -> Result<()> {
+    if !progress.wants_picture() {
+        return Ok(());
+    }
+    let (film, limits) = (&job.view.film, ladder.limits());
+    let image = develop(film, &job.layout(), blocks)?;
+    let report = Given::new(film, limits, blocks).report(adaptive.noise_threshold, limits);
+    let outcome = Outcome {
+        spp: report.mean_spp.round() as u32,
+        samples_complete: 0,
+        adaptive: Some(&report),
+    };
+    progress.picture(&job.picture(&options.scene, image, &outcome));
+    Ok(())
+}
+
 /// The pilots of a tile's blocks, and what they decide.
-fn pilot<C: ColorModel>(
+pub(super) fn pilot<C: ColorModel>(
     job: &Job<'_, C>,
     ladder: &Ladder,
     grid: &Grid,
     tile: usize,
     progress: &dyn Progress,
-) -> (Vec<Record>, Tally) {
+) -> Part {
     let mut tally = Tally::default();
     let mut records = Vec::new();
     for block in grid.tile(tile) {
@@ -274,7 +332,7 @@ fn pilot<C: ColorModel>(
 }
 
 /// All samples after the pilots.
-struct Rest {
+pub(super) struct Rest {
     /// The step of each half of each block.
     steps: Vec<usize>,
     /// How many samples that is.
@@ -286,7 +344,7 @@ struct Rest {
 }
 
 impl Rest {
-    fn new(grid: &Grid, ladder: &Ladder, steps: Vec<usize>) -> Self {
+    pub(super) fn new(grid: &Grid, ladder: &Ladder, steps: Vec<usize>) -> Self {
         let counts: Vec<u32> = steps.iter().map(|step| ladder.count(*step)).collect();
         let passes = |tile: usize| {
             let blocks = grid.tile(tile);
@@ -316,9 +374,23 @@ impl Rest {
         self.firsts.len() as u32 - 1
     }
 
+    /// The units of some passes, of which the first after the pilots is 0; later ones than are needed have none.
+    pub(super) fn units_of(&self, passes: Range<u32>) -> Range<usize> {
+        let first = |pass: u32| self.firsts[(pass as usize).min(self.firsts.len() - 1)];
+        first(passes.start)..first(passes.end)
+    }
+
     /// The pass of a unit; after the last unit, the number of passes.
     fn pass(&self, unit: usize) -> u32 {
         self.firsts[1..].partition_point(|first| *first <= unit) as u32
+    }
+
+    /// How many samples units take.
+    pub(super) fn samples(&self, grid: &Grid, units: Range<usize>) -> u64 {
+        units
+            .flat_map(|unit| self.slots(grid, unit))
+            .map(|(slot, indices)| area(&grid.block(slot / 2)) * indices.len() as u64)
+            .sum()
     }
 
     /// The halves of blocks that a unit adds to, each with the indices of its samples.
@@ -338,14 +410,14 @@ impl Rest {
             })
     }
 
-    fn render<C: ColorModel>(
+    pub(super) fn render<C: ColorModel>(
         &self,
         job: &Job<'_, C>,
         ladder: &Ladder,
         grid: &Grid,
         unit: usize,
         progress: &dyn Progress,
-    ) -> (Vec<Record>, Tally) {
+    ) -> Part {
         let mut tally = Tally::default();
         let mut records = Vec::new();
         for (slot, indices) in self.slots(grid, unit) {
@@ -455,36 +527,53 @@ impl Spread<'_> {
     }
 }
 
-/// What was given to the crop's pixels.
-pub(super) fn report<C: ColorModel>(
-    job: &Job<'_, C>,
-    adaptive: &Adaptive,
-    ladder: &Ladder,
-    blocks: &Blocks,
-) -> AdaptiveReport {
-    let (crop, limits) = (job.view.film.shown(), ladder.limits());
-    let (mut samples, mut at_limit) = (0, 0);
-    for (own, count) in blocks.counts() {
-        let seen = own.grown(0, &crop);
-        let pixels = u64::from(seen.width) * u64::from(seen.height);
-        samples += pixels * u64::from(count);
-        at_limit += if count == limits[1] { pixels } else { 0 };
+/// What was given to pixels.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Given {
+    pixels: u64,
+    samples: u64,
+    /// Pixels that got as many samples as possible.
+    at_limit: u64,
+}
+
+impl Given {
+    /// To those of the film's crop.
+    pub(super) fn new(film: &Film, limits: [u32; 2], blocks: &Blocks) -> Self {
+        let crop = film.shown();
+        let mut given = Self::default();
+        for (own, count) in blocks.counts() {
+            let seen = own.grown(0, &crop);
+            let pixels = area(&seen);
+            given.pixels += pixels;
+            given.samples += pixels * u64::from(count);
+            given.at_limit += if count == limits[1] { pixels } else { 0 };
+        }
+        given
     }
-    let pixels = f64::from(crop.width) * f64::from(crop.height);
-    AdaptiveReport {
-        noise_threshold: adaptive.noise_threshold,
-        limits,
-        mean_spp: samples as f64 / pixels,
-        at_limit: at_limit as f64 / pixels,
+
+    /// Adds what other pixels got.
+    pub(super) fn add(&mut self, other: &Self) {
+        self.pixels += other.pixels;
+        self.samples += other.samples;
+        self.at_limit += other.at_limit;
+    }
+
+    /// In proportion to the pixels.
+    pub(super) fn report(&self, noise_threshold: f64, limits: [u32; 2]) -> AdaptiveReport {
+        AdaptiveReport {
+            noise_threshold,
+            limits,
+            mean_spp: self.samples as f64 / self.pixels as f64,
+            at_limit: self.at_limit as f64 / self.pixels as f64,
+        }
     }
 }
 
 /// The film, and beside its channels `samples`, how many samples each pixel got, and `error`, the standard
 /// error of its luminance: half the difference of the halves' images, as its root mean square over a block.
-pub(super) fn develop<C: ColorModel>(job: &Job<'_, C>, blocks: &Blocks) -> Result<Image> {
-    let film = &job.view.film;
-    let halves = blocks.halves(&job.layout())?;
-    let mut sums = Sums::new(film.shown(), job.layout())?;
+pub(super) fn develop(film: &Film, layout: &Layout, blocks: &Blocks) -> Result<Image> {
+    let halves = blocks.halves(layout)?;
+    let mut sums = Sums::new(film.shown(), layout.clone())?;
     for half in &halves {
         sums.add_film(half);
     }

@@ -10,10 +10,10 @@ use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use blake3::Hasher;
 use serde::{Deserialize, Serialize};
 
 use super::fingerprint::Fingerprint;
+use super::hashing::Hashing;
 use super::options::Checkpoint;
 use crate::error::{Error, Problem, Result};
 use crate::file;
@@ -27,7 +27,7 @@ impl Checkpoint {
     }
 }
 
-const MARK: &[u8; 16] = b"etendue sums 3\r\n";
+const MARK: &[u8; 16] = b"etendue sums 4\r\n";
 /// Sums converted at a time.
 const CHUNK: usize = 1 << 13;
 
@@ -156,10 +156,7 @@ fn save(path: &Path, header: &Header, data: &[f64]) -> io::Result<()> {
 
 fn save_as(new: &Path, header: &Header, data: &[f64]) -> io::Result<()> {
     fs::create_dir_all(new.parent().unwrap_or(Path::new("")))?;
-    let mut out = Hashing {
-        inner: File::create(new)?,
-        hasher: Hasher::new(),
-    };
+    let mut out = Hashing::new(File::create(new)?);
     let json = serde_json::to_vec(header)?;
     out.write_all(MARK)?;
     out.write_all(&(json.len() as u32).to_le_bytes())?;
@@ -170,9 +167,7 @@ fn save_as(new: &Path, header: &Header, data: &[f64]) -> io::Result<()> {
         bytes.extend(chunk.iter().flat_map(|x| x.to_le_bytes()));
         out.write_all(&bytes)?;
     }
-    let hash = out.hasher.finalize();
-    out.inner.write_all(hash.as_bytes())?;
-    out.inner.sync_all()
+    out.seal()?.sync_all()
 }
 
 /// Reads the file into `data`, which has the length that the film asks for.
@@ -183,10 +178,7 @@ fn load(path: &Path, expected: &Fingerprint, data: &mut [f64]) -> Result<Header>
     };
     let file = file::open(path).map_err(failed)?;
     let about = file.metadata().map_err(failed)?;
-    let mut input = Hashing {
-        inner: io::BufReader::new(file),
-        hasher: Hasher::new(),
-    };
+    let mut input = Hashing::new(io::BufReader::new(file));
     let mut mark = [0; MARK.len()];
     input.read_exact(&mut mark).map_err(failed)?;
     if &mark != MARK {
@@ -221,9 +213,7 @@ fn load(path: &Path, expected: &Fingerprint, data: &mut [f64]) -> Result<Header>
             *x = f64::from_le_bytes(*bytes);
         }
     }
-    let mut hash = [0; blake3::OUT_LEN];
-    input.inner.read_exact(&mut hash).map_err(failed)?;
-    if input.hasher.finalize() != hash {
+    if !input.is_sealed().map_err(failed)? {
         return Err(damaged(path, "its content is not what was written"));
     }
     Ok(header)
@@ -235,30 +225,4 @@ fn damaged(path: &Path, why: &str) -> Error {
         path.display()
     ))
     .help("render without --resume to start anew")
-}
-
-/// A reader or writer that hashes what goes through.
-struct Hashing<T> {
-    inner: T,
-    hasher: Hasher,
-}
-
-impl<T: Read> Read for Hashing<T> {
-    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        let count = self.inner.read(buffer)?;
-        self.hasher.update(&buffer[..count]);
-        Ok(count)
-    }
-}
-
-impl<T: Write> Write for Hashing<T> {
-    fn write(&mut self, buffer: &[u8]) -> io::Result<usize> {
-        let count = self.inner.write(buffer)?;
-        self.hasher.update(&buffer[..count]);
-        Ok(count)
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        self.inner.flush()
-    }
 }

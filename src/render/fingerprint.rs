@@ -109,7 +109,7 @@ impl Fingerprint {
             },
         };
         let settings = format!(
-            "seed {} bands {bands} tile {TILE} pass {PASS} block {BLOCK} {:?}",
+            "seed {} bands {bands} tile {TILE} passes 1, {PASS} block {BLOCK} {:?}",
             options.seed, options.adaptive
         );
         Ok(Self {
@@ -120,6 +120,14 @@ impl Fingerprint {
             settings: hash(&settings),
             sources,
         })
+    }
+
+    /// The files that it names beside those of the view, which has them anew.
+    pub(super) fn named(&self, description: &Description, sensor: NodeId) -> Vec<PathBuf> {
+        let of_view = description.canonical(Part::View(sensor)).files.len();
+        let of_scene = self.files.len().saturating_sub(of_view);
+        let files = self.files[..of_scene].iter();
+        files.map(|file| PathBuf::from(&file.name)).collect()
     }
 
     /// What is not the same in `other`, in words.
@@ -171,7 +179,7 @@ fn hash(text: &str) -> String {
     blake3::hash(text.as_bytes()).to_hex().to_string()
 }
 
-fn hash_file(path: &Path) -> std::io::Result<String> {
+pub(super) fn hash_file(path: &Path) -> std::io::Result<String> {
     let mut hasher = Hasher::new();
     hasher.update_reader(file::open(path)?)?;
     Ok(hasher.finalize().to_hex().to_string())

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
+use super::named;
 use super::options::Options;
 use super::prepare::{self, View};
 use super::progress::Progress;
@@ -21,6 +22,7 @@ pub struct SceneInfo {
     /// Copies of shape groups.
     pub instances: usize,
     /// Low and high corner of the box around the scene, absent where it is empty.
+    #[serde(serialize_with = "named::bounds")]
     pub bounds: Option<[[f32; 3]; 2]>,
     /// Bytes of geometry in memory.
     pub geometry_bytes: usize,
@@ -45,6 +47,7 @@ pub struct SensorInfo {
     /// The plugin.
     pub plugin: String,
     /// Pixels across and down the film.
+    #[serde(serialize_with = "named::size")]
     pub size: [u32; 2],
     /// Samples a pixel.
     pub spp: u32,

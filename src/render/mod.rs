@@ -12,13 +12,21 @@ mod check;
 mod checkpoint;
 mod colors;
 mod fingerprint;
+mod hashing;
 mod heat;
 mod info;
+mod machine;
 mod memory;
+mod merge;
+mod named;
+mod origin;
+mod outline;
+mod part;
 mod pinned;
 mod plan;
 mod plugins;
 mod prepare;
+mod provenance;
 mod samples;
 mod sensors;
 mod session;
@@ -39,12 +47,17 @@ pub use adaptive::AdaptiveReport;
 pub use bare::{Background, BareMesh, Finish, Lighting, Staging, UpAxis, describe_mesh, is_mesh};
 pub use heat::Heat;
 pub use info::{NamedFile, SceneInfo, SensorInfo};
+pub use machine::machine;
 pub use memory::check_mesh;
+pub use merge::{MergeReport, Merged, merge};
 pub use options::{Adaptive, Checkpoint, Colors, Options, Overrides};
+pub use outline::{Outline, outline};
+pub use part::{Passes, check_part_writable, is_part};
 pub(crate) use pinned::pin;
 pub use plan::Completed;
 pub use plugins::{Listed, plugins};
-pub use progress::{Phase, Progress, Silent};
+pub use progress::{Phase, Picture, Progress, Silent};
+pub use provenance::{Provenance, is_current};
 pub use sensors::{find_sensor, sensor_names, sensors};
 pub use session::Session;
 
@@ -57,6 +70,17 @@ pub struct Rendered {
     pub window: Window,
     /// How the image was made, for the file.
     pub metadata: Metadata,
+    /// What it was made of, where that is asked for and it is whole.
+    pub provenance: Option<Provenance>,
+    /// What was done, counted and timed.
+    pub report: Report,
+    /// What the user should know.
+    pub warnings: Vec<Problem>,
+}
+
+/// A part of an image that was rendered.
+#[derive(Debug)]
+pub struct Parted {
     /// What was done, counted and timed.
     pub report: Report,
     /// What the user should know.
@@ -67,12 +91,16 @@ pub struct Rendered {
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
     /// Pixels across and down.
+    #[serde(serialize_with = "named::size")]
     pub size: [u32; 2],
     /// Samples a pixel; on average where sampling is adaptive.
     pub spp: u32,
     /// Where samples went, if sampling is adaptive.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub adaptive: Option<AdaptiveReport>,
+    /// Which passes over the film, where it is a part of the image.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub passes: Option<std::ops::Range<u32>>,
     /// How much of it is done: all, unless the render was stopped.
     pub completed: Completed,
     /// Seed of the random numbers.
@@ -84,6 +112,7 @@ pub struct Report {
     /// Lights.
     pub lights: usize,
     /// Bytes of geometry and of trees.
+    #[serde(serialize_with = "named::bytes")]
     pub bytes: [usize; 2],
     /// What the folder of trees was good for, if there is one and the scene was not in memory.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -93,6 +122,7 @@ pub struct Report {
     /// Samples that were not finite and were dropped.
     pub dropped_samples: u64,
     /// One of their pixels.
+    #[serde(serialize_with = "named::pixel")]
     pub dropped_pixel: Option<[u32; 2]>,
     /// Seconds by phase. What a session had in memory took none, and a resumed render all of its runs.
     pub seconds: Seconds,

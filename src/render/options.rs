@@ -77,6 +77,8 @@ pub struct Options {
     pub cache: Option<PathBuf>,
     /// Which of the scene's sensors, in file order from 0.
     pub sensor: usize,
+    /// Whether it is told what the image was made of.
+    pub recorded: bool,
     /// Where the render is kept, so that it can be continued after an interruption.
     pub checkpoint: Option<Checkpoint>,
 }

@@ -1,16 +1,17 @@
 //! How a render is cut into units: the samples into passes, and each pass into the tiles of a grid that is
-//! fixed to the full film, whatever the crop. Units have an order, and whatever was done when a render
-//! stopped is a beginning of that order.
+//! fixed to the full film, whatever the crop. The first pass takes one sample of each pixel, so that there is soon a whole
+//! picture. Units have an order, and whatever was done when a render stopped is a beginning of that order.
 
 use std::ops::Range;
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
+use super::named;
 use crate::sensor::{Film, Window};
 
 /// Pixels along a tile's side.
 pub(super) const TILE: u32 = 32;
-/// Samples of a pixel in one pass.
+/// Samples of a pixel in one pass; in the first two, together.
 pub(super) const PASS: u32 = 16;
 
 /// The units of a render, in their order.
@@ -30,19 +31,42 @@ impl Plan {
         Self { needed, tiles, spp }
     }
 
+    /// Samples of each pixel.
+    pub(super) fn spp(&self) -> u32 {
+        self.spp
+    }
+
     /// How many units there are.
     pub(super) fn units(&self) -> usize {
         self.tiles.len() * self.passes() as usize
     }
 
-    fn passes(&self) -> u32 {
-        self.spp.div_ceil(PASS)
+    /// How many passes there are.
+    pub(super) fn passes(&self) -> u32 {
+        match self.spp {
+            0..=1 => self.spp,
+            more => 1 + more.div_ceil(PASS),
+        }
+    }
+
+    /// The samples that passes before this one take of a pixel.
+    fn samples_before(&self, pass: u32) -> u32 {
+        match pass {
+            0 => 0,
+            1 => self.spp.min(1),
+            later => self.spp.min((later - 1).saturating_mul(PASS)),
+        }
+    }
+
+    /// The units of some passes.
+    pub(super) fn units_of(&self, passes: Range<u32>) -> Range<usize> {
+        passes.start as usize * self.tiles.len()..passes.end as usize * self.tiles.len()
     }
 
     /// A unit's tile and sample indices.
     pub(super) fn unit(&self, unit: usize) -> (&Window, Range<u32>) {
-        let first = (unit / self.tiles.len()) as u32 * PASS;
-        let samples = first..self.spp.min(first + PASS);
+        let pass = (unit / self.tiles.len()) as u32;
+        let samples = self.samples_before(pass)..self.samples_before(pass + 1);
         (&self.tiles[unit % self.tiles.len()], samples)
     }
 
@@ -58,8 +82,8 @@ impl Plan {
                 .sum()
         };
         let (passes, rest) = (units / self.tiles.len(), units % self.tiles.len());
-        let whole = self.spp.min(passes as u32 * PASS);
-        let begun = self.spp.min(whole + PASS) - whole;
+        let whole = self.samples_before(passes as u32);
+        let begun = self.samples_before(passes as u32 + 1) - whole;
         pixels(&self.tiles) * u64::from(whole) + pixels(&self.tiles[..rest]) * u64::from(begun)
     }
 
@@ -67,7 +91,7 @@ impl Plan {
     pub(super) fn completed(&self, units: usize) -> Completed {
         let passes = (units / self.tiles.len()) as u32;
         Completed {
-            samples: self.spp.min(passes * PASS),
+            samples: self.samples_before(passes),
             passes: [passes, self.passes()],
             units: [units, self.units()],
         }
@@ -75,17 +99,28 @@ impl Plan {
 }
 
 /// How much of a render is done.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Completed {
     /// Samples that every pixel has; those of the pass under way may have up to 16 more.
     pub samples: u32,
     /// Passes over the film that are done, and how many there are.
+    #[serde(serialize_with = "named::progress")]
     pub passes: [u32; 2],
     /// Tiles of all passes that are done, and how many there are.
+    #[serde(serialize_with = "named::progress")]
     pub units: [usize; 2],
 }
 
 impl Completed {
+    /// What was done since `earlier`, of as much in all.
+    pub(super) fn since(&self, earlier: &Self) -> Self {
+        Self {
+            samples: self.samples - earlier.samples,
+            passes: [self.passes[0] - earlier.passes[0], self.passes[1]],
+            units: [self.units[0] - earlier.units[0], self.units[1]],
+        }
+    }
+
     /// Whether nothing is left to do.
     pub fn is_whole(&self) -> bool {
         self.units[0] == self.units[1]
@@ -118,6 +153,25 @@ mod tests {
     use super::*;
 
     #[test]
+    fn passes_take_one_sample_and_then_fill_up_to_whole_groups() {
+        for (spp, expected) in [
+            (1, &[[0, 1]][..]),
+            (2, &[[0, 1], [1, 2]]),
+            (16, &[[0, 1], [1, 16]]),
+            (33, &[[0, 1], [1, 16], [16, 32], [32, 33]]),
+        ] {
+            let plan = Plan::new(&Film::default(), spp);
+            let ranges = (0..plan.passes()).map(|pass| {
+                let units = plan.units_of(pass..pass + 1);
+                let [first, last] = [units.start, units.end - 1].map(|unit| plan.unit(unit).1);
+                assert_eq!(first, last);
+                [first.start, first.end]
+            });
+            assert!(ranges.eq(expected.iter().copied()), "{spp}");
+        }
+    }
+
+    #[test]
     fn the_units_before_a_unit_hold_its_samples_and_all_hold_all() {
         let film = Film {
             width: 70,
@@ -148,11 +202,12 @@ mod tests {
     #[test]
     fn what_is_complete_is_told_in_samples_that_every_pixel_has() {
         let plan = Plan::new(&Film::default(), 40);
-        let tiles = plan.units() / 3;
+        let tiles = plan.units() / 4;
         assert_eq!(plan.completed(tiles - 1).samples, 0);
-        assert_eq!(plan.completed(2 * tiles + 1).samples, 32);
-        assert_eq!(plan.completed(2 * tiles + 1).passes, [2, 3]);
-        let all = plan.completed(3 * tiles);
+        assert_eq!(plan.completed(tiles).samples, 1);
+        assert_eq!(plan.completed(3 * tiles + 1).samples, 32);
+        assert_eq!(plan.completed(3 * tiles + 1).passes, [3, 4]);
+        let all = plan.completed(4 * tiles);
         assert!(all.is_whole() && all.samples == 40);
     }
 }

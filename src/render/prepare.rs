@@ -9,18 +9,20 @@ use std::sync::OnceLock;
 use super::black;
 use super::colors::Model;
 use super::fingerprint::{self, Contents, Fingerprint};
+use super::machine::machine;
 use super::memory::{self, Estimate};
 use super::options::Options;
+use super::origin::{Origin, Outcome};
 use super::plan::Completed;
 use super::plugins;
-use super::progress::{Phase, Progress};
+use super::progress::{Phase, Picture, Progress};
 use super::{Report, Seconds, timed};
 use crate::accel::{Build, CacheUse, Method, Recipe};
 use crate::color::ColorModel;
 use crate::description::{Description, Kind, NodeId, Properties};
 use crate::error::{self, Error, Location, Problem, Problems, Result};
 use crate::film::Layout;
-use crate::image::{self, Metadata, Window};
+use crate::image::{self, Image, Window};
 use crate::integrator::{self, Estimator, Footprint, Integrator};
 use crate::mesh::ReadMesh;
 use crate::sampler::Sampler;
@@ -270,7 +272,7 @@ impl Ask<'_> {
 
 /// How many rays a film of so many samples a pixel takes, as a rule: paths of three bounces that each ask
 /// for light.
-fn rays(film: &Film, samples: u32) -> u64 {
+pub(super) fn rays(film: &Film, samples: u32) -> u64 {
     const A_SAMPLE: u64 = 6;
     let pixels = u64::from(film.crop.width) * u64::from(film.crop.height);
     pixels.saturating_mul(u64::from(samples) * A_SAMPLE)
@@ -463,7 +465,7 @@ fn written(film: &Film, layout: &Layout) -> Vec<String> {
 }
 
 /// The channels of samples.
-fn layout<C: ColorModel>(color: &C, integrator: &Integrator<C>) -> Layout {
+pub(super) fn layout<C: ColorModel>(color: &C, integrator: &Integrator<C>) -> Layout {
     Layout::new(color.channels(), integrator.extra_channels())
 }
 
@@ -514,6 +516,7 @@ impl<C: ColorModel> Job<'_, C> {
             size: [crop.width, crop.height],
             spp: self.view.sampler.sample_count(),
             adaptive: None,
+            passes: None,
             completed,
             seed: self.seed,
             threads: rayon::current_num_threads(),
@@ -528,34 +531,27 @@ impl<C: ColorModel> Job<'_, C> {
         }
     }
 
-    /// How the image was made.
-    pub(super) fn metadata(&self, scene_name: &str, report: &Report) -> Metadata {
-        let to_camera = self
-            .view
-            .sensor
-            .world_to_camera(self.view.sensor.shutter().0);
-        let metadata = Metadata::default()
-            .with("software", concat!("etendue ", env!("CARGO_PKG_VERSION")))
-            .with("scene", scene_name)
-            .with("integrator", self.view.integrator_name.as_str())
-            .with("spp", report.spp)
-            .with("samples_complete", report.completed.samples)
-            .with("seed", i64::try_from(report.seed).unwrap_or(i64::MAX))
-            .with("world_to_camera", to_camera)
-            .with("world_to_ndc", self.view.sensor.projection() * to_camera);
-        // Fichet, Pacanowski and Wilkie 2021, section 4.
-        let bands = self.scene.color().channels();
-        let metadata = match bands.iter().any(|name| name.starts_with("S0.")) {
-            true => (metadata.with("spectralLayoutVersion", "1.0"))
-                .with("emissiveUnits", "W.m^-2.sr^-1"),
-            false => metadata,
-        };
-        match &report.adaptive {
-            None => metadata,
-            Some(adaptive) => metadata
-                .with("noise_threshold", adaptive.noise_threshold)
-                .with("min_spp", adaptive.limits[0])
-                .with("max_spp", adaptive.limits[1]),
+    /// The image of a render that goes on.
+    pub(super) fn picture(&self, scene: &str, image: Image, outcome: &Outcome<'_>) -> Picture {
+        Picture {
+            image,
+            window: self.window(),
+            metadata: self.origin(scene).metadata(outcome),
+        }
+    }
+
+    /// What the image is of.
+    pub(super) fn origin(&self, scene: &str) -> Origin {
+        let View { sensor, .. } = &self.view;
+        let to_camera = sensor.world_to_camera(sensor.shutter().0);
+        Origin {
+            scene: scene.to_owned(),
+            integrator: self.view.integrator_name.clone(),
+            seed: self.seed,
+            machine: machine(),
+            world_to_camera: to_camera.to_cols_array(),
+            world_to_ndc: (sensor.projection() * to_camera).to_cols_array(),
+            spectral: (self.scene.color().channels().iter()).any(|name| name.starts_with("S0.")),
         }
     }
 }

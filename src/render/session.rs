@@ -3,28 +3,33 @@
 //! another takes the place of the one before, so that one is in memory at a time.
 
 use std::num::NonZeroUsize;
+use std::path::Path;
 use std::sync::Arc;
 
 use rayon::ThreadPool;
 
-use super::adaptive::{self, AdaptiveReport};
+use super::adaptive::{self, AdaptiveReport, Ladder};
 use super::black;
 use super::checkpoint::Keeper;
 use super::colors::Model;
 use super::heat::{self, Heat};
 use super::options::{Adaptive, Options};
+use super::origin::Outcome;
+use super::part::{self, Head, Made, Noise, Passes};
 use super::pinned;
-use super::plan::Completed;
-use super::prepare::{self, Ask, Facts, Job, Shelf};
+use super::plan::{Completed, Plan};
+use super::prepare::{self, Ask, Facts, Job, Shelf, View};
 use super::progress::Progress;
+use super::provenance::{self, Provenance};
 use super::uniform;
-use super::{Rendered, timed};
+use super::{Parted, Rendered, Report, timed};
 use crate::color::{Bands, ColorModel, Comb, MAX_BANDS, Response, Rgb};
 use crate::description::Description;
 use crate::error::{Error, Result};
 use crate::film::{Accumulator, Tally};
 use crate::image::Image;
 use crate::mesh::ReadMesh;
+use crate::sensor::Film;
 use crate::shape::Bounds;
 
 /// Renders that follow one another; see the module.
@@ -106,8 +111,10 @@ impl Task for Render<'_> {
             tally,
             adaptive,
         } = timed(&mut seconds.render, || match &options.adaptive {
-            None => Finished::uniform(&job, progress, keeper.as_mut()),
-            Some(adaptive) => Finished::adaptive(&job, adaptive, progress, keeper.as_mut()),
+            None => Finished::uniform(&job, options, progress, keeper.as_mut()),
+            Some(adaptive) => {
+                Finished::adaptive(&job, (options, adaptive), progress, keeper.as_mut())
+            }
         })?;
         let mut warnings = job.warnings.clone();
         if let Some(keeper) = &keeper {
@@ -119,21 +126,31 @@ impl Task for Render<'_> {
             report.spp = adaptive.mean_spp.round() as u32;
             report.adaptive = Some(adaptive);
         }
-        report.stats = tally.stats;
-        report.seconds.spend(&tally.times);
-        report.dropped_samples = tally.dropped;
-        let margin = job.view.film.margin();
-        report.dropped_pixel = tally
-            .dropped_pixel
-            .map(|pixel| pixel.map(|place| place.saturating_sub(margin)));
+        tell(&mut report, &tally, &job.view.film);
         warnings.extend(tally.warning());
         if completed.units[0] > 0 {
             warnings.extend(black::black(&job, description, &image));
         }
+        let provenance = match options.recorded && completed.is_whole() {
+            true => {
+                let film = &job.view.film;
+                let whole = provenance::without_crop(description, film);
+                Some(Provenance::new(
+                    job.fingerprint(&whole, options)?,
+                    film.crop,
+                ))
+            }
+            false => None,
+        };
         let rendered = Rendered {
             image,
+            provenance,
             window: job.window(),
-            metadata: job.metadata(&options.scene, &report),
+            metadata: job.origin(&options.scene).metadata(&Outcome {
+                spp: report.spp,
+                samples_complete: report.completed.samples,
+                adaptive: report.adaptive.as_ref(),
+            }),
             report,
             warnings,
         };
@@ -142,6 +159,73 @@ impl Task for Render<'_> {
         }
         Ok(rendered)
     }
+}
+
+/// Makes a part.
+struct Part<'a> {
+    ask: Ask<'a>,
+    passes: Passes,
+    path: &'a Path,
+}
+
+impl Task for Part<'_> {
+    type Output = Parted;
+
+    fn run<C: ColorModel>(mut self, color: C) -> Result<Parted> {
+        let (description, options) = (self.ask.description, self.ask.options);
+        let progress = self.ask.progress;
+        let job = prepare::prepare(&mut self.ask, color)?;
+        let View { film, sampler, .. } = &job.view;
+        let spp = sampler.sample_count();
+        let ladder = match &options.adaptive {
+            Some(adaptive) => Some((adaptive, Ladder::checked(sampler, adaptive)?)),
+            None => None,
+        };
+        let all_passes = match &ladder {
+            Some((_, ladder)) => ladder.passes(),
+            None => Plan::new(film, spp).passes(),
+        };
+        let whole = provenance::without_crop(description, film);
+        let head = Head {
+            fingerprint: job.fingerprint(&whole, options)?,
+            target: part::target(),
+            origin: job.origin(&options.scene),
+            film: film.clone(),
+            layout: job.layout(),
+            spp,
+            adaptive: ladder.as_ref().map(|(adaptive, ladder)| Noise {
+                threshold: adaptive.noise_threshold,
+                limits: ladder.limits(),
+            }),
+            passes: self.passes.within(all_passes)?,
+            all_passes,
+        };
+        let mut seconds = job.spent;
+        let ladder = ladder.as_ref().map(|(_, ladder)| ladder);
+        let Made { completed, tally } = timed(&mut seconds.render, || {
+            part::make(&job, &head, ladder, self.path, progress)
+        })?;
+        let mut report = job.report(completed, seconds);
+        tell(&mut report, &tally, film);
+        report.passes = Some(head.passes.clone());
+        let mut warnings = job.warnings.clone();
+        warnings.extend(tally.warning());
+        if let Some(kept) = &mut self.ask.shelf.kept {
+            kept.told();
+        }
+        Ok(Parted { report, warnings })
+    }
+}
+
+/// What samples cost and what came of them beside the image.
+fn tell(report: &mut Report, tally: &Tally, film: &Film) {
+    report.stats = tally.stats;
+    report.seconds.spend(&tally.times);
+    report.dropped_samples = tally.dropped;
+    let margin = film.margin();
+    report.dropped_pixel = tally
+        .dropped_pixel
+        .map(|pixel| pixel.map(|place| place.saturating_sub(margin)));
 }
 
 /// Counts by pixel.
@@ -167,10 +251,11 @@ struct Finished {
 impl Finished {
     fn uniform<C: ColorModel>(
         job: &Job<'_, C>,
+        options: &Options,
         progress: &dyn Progress,
         mut keeper: Option<&mut Keeper>,
     ) -> Result<Self> {
-        let (summed, completed) = uniform::render(job, progress, keeper.as_deref_mut())?;
+        let (summed, completed) = uniform::render(job, options, progress, keeper.as_deref_mut())?;
         if let Some(keeper) = keeper {
             keeper.finish(&summed, completed.is_whole());
         }
@@ -186,22 +271,27 @@ impl Finished {
 
     fn adaptive<C: ColorModel>(
         job: &Job<'_, C>,
-        adaptive: &Adaptive,
+        options: (&Options, &Adaptive),
         progress: &dyn Progress,
         mut keeper: Option<&mut Keeper>,
     ) -> Result<Self> {
         let (summed, completed, ladder) =
-            adaptive::render(job, adaptive, progress, keeper.as_deref_mut())?;
+            adaptive::render(job, options, progress, keeper.as_deref_mut())?;
         if let Some(keeper) = keeper {
             keeper.finish(&summed, completed.is_whole());
         }
         let blocks = &summed.sums;
         let mut tally = *blocks.tally();
         Ok(Self {
-            image: added(&mut tally.times.film, || adaptive::develop(job, blocks))?,
+            image: added(&mut tally.times.film, || {
+                adaptive::develop(&job.view.film, &job.layout(), blocks)
+            })?,
             completed,
             tally,
-            adaptive: Some(adaptive::report(job, adaptive, &ladder, blocks)),
+            adaptive: Some(
+                adaptive::Given::new(&job.view.film, ladder.limits(), blocks)
+                    .report(options.1.noise_threshold, ladder.limits()),
+            ),
         })
     }
 }
@@ -242,6 +332,32 @@ impl Session {
                 traced: true,
             };
             Render(ask).run_in(description, options)
+        })
+    }
+
+    /// Renders some passes of what `description` says into a part of the image, the file `path`, which
+    /// [`merge`](super::merge()) puts together with the others. A render that was stopped is no error: the report says
+    /// so, and no file is written.
+    ///
+    /// # Errors
+    /// As [`Session::render`], and where there are no such passes or the file cannot be written.
+    pub fn render_part(
+        &mut self,
+        description: &Description,
+        options: &Options,
+        passes: Passes,
+        path: &Path,
+        progress: &dyn Progress,
+    ) -> Result<Parted> {
+        self.run(options, |shelf| {
+            let ask = Ask {
+                shelf,
+                description,
+                options,
+                progress,
+                traced: true,
+            };
+            Part { ask, passes, path }.run_in(description, options)
         })
     }
 

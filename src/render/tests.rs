@@ -164,9 +164,17 @@ fn a_stopped_render_says_how_much_of_it_is_there() {
             passes,
             units,
         } = rendered.report.completed;
-        assert!(units[0] <= batches && units[1] == 3 * tiles);
-        assert_eq!(passes, [(units[0] / tiles) as u32, 3]);
-        assert_eq!(samples, 16 * passes[0]);
+        assert!(units[0] <= batches && units[1] == 4 * tiles);
+        assert_eq!(passes, [(units[0] / tiles) as u32, 4]);
+        assert_eq!(samples, [0, 1, 16][passes[0] as usize]);
+        if passes[0] > 0 {
+            let dark = |pixel: &[f32]| pixel.iter().all(|v| *v == 0.0);
+            let pixels = rendered.image.data().chunks_exact(3);
+            assert!(
+                pixels.filter(|pixel| dark(pixel)).count() == 0,
+                "a whole picture"
+            );
+        }
         let entry = rendered
             .metadata
             .entries

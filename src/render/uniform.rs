@@ -1,14 +1,16 @@
 //! The same number of samples for every pixel: the tiles of each pass.
 
 use super::checkpoint::Keeper;
+use super::options::Options;
+use super::origin::Outcome;
 use super::plan::{Completed, Plan};
 use super::prepare::Job;
 use super::progress::{Phase, Progress};
 use super::samples::{self, Sink};
 use super::unit;
 use crate::color::ColorModel;
-use crate::error::Result;
-use crate::film::{GROUP, Group, Summed, Sums, Tally};
+use crate::error::{Error, Result};
+use crate::film::{Accumulator as _, GROUP, Group, Summed, Sums, Tally};
 use crate::filter::Filter;
 use crate::lanes::Kernel;
 use crate::sampler::Stream;
@@ -16,6 +18,7 @@ use crate::sampler::Stream;
 /// Renders the job's crop, going on from what `keeper` kept, until `progress` asks to stop.
 pub(super) fn render<C: ColorModel>(
     job: &Job<'_, C>,
+    options: &Options,
     progress: &dyn Progress,
     mut keeper: Option<&mut Keeper>,
 ) -> Result<(Summed<Sums>, Completed)> {
@@ -29,15 +32,33 @@ pub(super) fn render<C: ColorModel>(
     }
     progress.begin(Phase::Render, plan.samples(plan.units()));
     progress.advance(plan.samples(summed.next), 0);
-    let summed = unit::run(plan.units(), summed, progress, keeper, |unit| {
+    let (first, scene) = (summed.next, options.scene.as_str());
+    let add = |part: Sums| {
+        summed.sums.add(&part);
+        summed.next += 1;
+        if let Some(keeper) = &mut keeper {
+            keeper.keep_when_due(&summed);
+        }
+        if progress.wants_picture() {
+            let image = summed.sums.develop(&job.view.film)?;
+            let outcome = Outcome {
+                spp: plan.spp(),
+                samples_complete: plan.completed(summed.next).samples,
+                adaptive: None,
+            };
+            progress.picture(&job.picture(scene, image, &outcome));
+        }
+        Ok::<_, Error>(())
+    };
+    unit::run(first..plan.units(), progress, add, |unit| {
         render_unit(job, &plan, unit, progress)
-    });
+    })?;
     let completed = plan.completed(summed.next);
     Ok((summed, completed))
 }
 
 /// One tile, for one pass.
-fn render_unit<C: ColorModel>(
+pub(super) fn render_unit<C: ColorModel>(
     job: &Job<'_, C>,
     plan: &Plan,
     unit: usize,

@@ -5,6 +5,8 @@
 
 use std::sync::Arc;
 
+use serde::{Deserialize, Serialize};
+
 use crate::color::{Bands, Response, Role};
 use crate::description::declared::{
     Plugin, Plugins, Row, boolean, choice, integer, nested, string,
@@ -12,11 +14,11 @@ use crate::description::declared::{
 use crate::description::{Kind, Properties};
 use crate::error::{Error, Result};
 use crate::family;
-use crate::filter::Filter;
+use crate::filter::{Filter, MAX_RADIUS};
 use crate::texture::Palette;
 
 /// A rectangle of pixels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct Window {
     /// Left edge.
     pub x: u32,
@@ -57,7 +59,7 @@ impl Window {
 }
 
 /// In which terms colours are written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Coordinates {
     /// R, G, B: linear BT.709.
     Rgb,
@@ -82,7 +84,7 @@ impl Coordinates {
 }
 
 /// Which channels the image gets.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PixelFormat {
     /// Those of colours.
     pub colors: Coordinates,
@@ -131,7 +133,7 @@ impl PixelFormat {
 }
 
 /// The film's settings.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Film {
     /// Pixels across the full film.
     pub width: u32,
@@ -145,7 +147,8 @@ pub struct Film {
     pub filter: Filter,
     /// Whether samples that lie beyond the film's edges count as far as the filter reaches.
     pub sample_border: bool,
-    /// The channels of a `specfilm`; none of another film.
+    /// The channels of a `specfilm`; none of another film. Sums that are kept are of them already.
+    #[serde(skip)]
     pub responses: Arc<[Response]>,
 }
 
@@ -240,6 +243,18 @@ impl Film {
     /// Width over height, of the full film.
     pub fn aspect(&self) -> f64 {
         f64::from(self.width) / f64::from(self.height)
+    }
+
+    /// Whether it is one that [`Film::build`] may have made: what was read from a file need not be.
+    pub(crate) fn is_sound(&self) -> bool {
+        let Window { width, height, .. } = self.crop;
+        let side = |size: u32| (1..=MAX_SIDE as u32).contains(&size);
+        let filter = f64::from(self.filter.radius());
+        side(self.width)
+            && side(self.height)
+            && self.full().contains(&self.crop)
+            && (1..=MAX_PIXELS).contains(&(u64::from(width) * u64::from(height)))
+            && (0.0..=MAX_RADIUS).contains(&filter)
     }
 
     /// The whole film.

@@ -103,10 +103,12 @@ fn help_reads_as_it_was_blessed() {
     for (name, arguments) in [
         ("etendue", &["--help"][..]),
         ("render", &["render", "--help"]),
+        ("batch", &["batch", "--help"]),
         ("check", &["check", "--help"]),
         ("compare", &["compare", "--help"]),
         ("info", &["info", "--help"]),
         ("convert", &["convert", "--help"]),
+        ("merge", &["merge", "--help"]),
         ("relight", &["relight", "--help"]),
         ("color", &["color", "--help"]),
         ("spectrum", &["spectrum", "--help"]),
@@ -345,11 +347,17 @@ fn info_counts_what_scenes_meshes_and_images_hold() {
     assert_eq!(scene["primitives"], 12);
     assert_eq!(scene["plugins"]["shape"]["cube"], 1);
     assert_eq!(scene["sensors"][0]["id"], "front");
-    assert_eq!(scene["sensors"][1]["size"], serde_json::json!([24, 16]));
+    assert_eq!(
+        scene["sensors"][1]["size"],
+        serde_json::json!({ "width": 24, "height": 16 })
+    );
     assert_eq!(mesh["triangles"], 1);
     assert_eq!(mesh["vertices"], 3);
     assert_eq!(mesh["area"], 0.5);
-    assert_eq!(image["size"], serde_json::json!([24, 16]));
+    assert_eq!(
+        image["size"],
+        serde_json::json!({ "width": 24, "height": 16 })
+    );
     assert_eq!(image["metadata"]["seed"], "5");
     assert_eq!(image["channels"].as_array().unwrap().len(), 3);
     let text = place.run("info scene.xml mesh.ply image.exr missing.png");

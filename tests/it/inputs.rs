@@ -669,7 +669,7 @@ fn what_is_right_is_rendered_with_status_zero() {
         assert_eq!(output.status.code(), Some(0), "{output:?}");
         let said: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
         assert_eq!(said["output"], name);
-        assert_eq!(said["size"], serde_json::json!([4, 4]));
+        assert_eq!(said["size"], serde_json::json!({ "width": 4, "height": 4 }));
         assert!(folder.path().join(name).exists());
     }
 }

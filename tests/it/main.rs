@@ -4,6 +4,7 @@
 mod support;
 
 mod bands;
+mod batch;
 mod channels;
 mod cli;
 mod closed_form;
@@ -22,8 +23,10 @@ mod mesh;
 mod mitsuba_data;
 mod motion;
 mod opacity;
+mod parts;
 mod phong;
 mod profile;
 mod resume;
 mod same_bits;
+mod signs;
 mod tour;

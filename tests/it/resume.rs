@@ -191,7 +191,7 @@ fn a_time_limit_is_no_failure_and_can_be_continued() {
     assert!(place.path("a.exr").exists() && place.path("a.exr.checkpoint").exists());
     let output = place.run(&[&limited[..], &["--resume"]].concat());
     let second = object(&output);
-    let done = |told: &Value| told["completed"]["units"][0].as_u64().unwrap();
+    let done = |told: &Value| told["completed"]["units"]["done"].as_u64().unwrap();
     assert!(done(&second) > done(&first));
     let other = place.run(&[&limited[..], &["--resume", "--seed", "1"]].concat());
     assert_eq!(other.status.code(), Some(1));

@@ -117,7 +117,7 @@ fn write(arguments: &Arguments, output: &Path, name: &str, mesh: &Mesh) -> Resul
             "triangles": triangles,
             "vertices": vertices,
         });
-        output::line(&object.to_string());
+        output::object(object);
     } else if !arguments.quiet {
         output::line(&told(output, triangles, vertices));
     }

@@ -138,7 +138,7 @@ pub(in crate::cli) fn run(arguments: &Arguments) -> Result<u8> {
     let spheres = mesh::flake_balls(*levels).expect("there are not so many levels");
     if arguments.json {
         let object = json!({ "file": output.display().to_string(), "spheres": spheres });
-        output::line(&object.to_string());
+        output::object(object);
     } else if !arguments.quiet {
         output::line(&format!("{}: {spheres} spheres", output.display()));
     }
@@ -154,7 +154,7 @@ fn write(arguments: &Arguments) -> Result<u8> {
     if arguments.json {
         let file = output.display().to_string();
         let object = json!({ "file": file, "triangles": triangles, "vertices": vertices });
-        output::line(&object.to_string());
+        output::object(object);
     } else if !arguments.quiet {
         output::line(&convert::told(output, triangles, vertices));
     }

@@ -45,7 +45,7 @@ pub(in crate::cli) fn run(arguments: &Arguments) -> Result<u8> {
     let mut worst = status::DONE;
     for input in &arguments.inputs {
         match examine(arguments, input) {
-            Ok(object) if arguments.json => output::line(&object.to_string()),
+            Ok(object) if arguments.json => output::object(object),
             Ok(object) => {
                 output::line(&input.display().to_string());
                 info::print(&object, 1);

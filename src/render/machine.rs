@@ -1,13 +1,14 @@
-//! The machine that a profile was made on, in words: its processor and how much memory it has. Known on Linux; elsewhere
+//! The machine, in words: its processor and how much memory it has. Known on Linux; elsewhere
 //! the number of processors and the system's name.
 
 use std::fs;
 use std::thread;
 
 use crate::budget::human_bytes;
+use crate::lanes::Kernel;
 
-/// Such as `AMD EPYC 7543, 2 processors, 16.4 GB, linux`.
-pub(super) fn name() -> String {
+/// Such as `AMD EPYC 7543, 2 processors, 16.4 GB, linux x86_64, AVX2`.
+pub fn machine() -> String {
     let read = |file| fs::read_to_string(file).unwrap_or_default();
     let (model, memory) = (
         model(&read("/proc/cpuinfo")),
@@ -24,6 +25,7 @@ pub(super) fn name() -> String {
         Some(processors),
         memory.map(human_bytes),
         Some(system),
+        Some(Kernel::best().name().to_owned()),
     ];
     parts.into_iter().flatten().collect::<Vec<_>>().join(", ")
 }
@@ -59,6 +61,6 @@ mod tests {
         for odd in ["", "model name", "model name :", "MemTotal: many kB"] {
             assert_eq!((model(odd), memory(odd)), (None, None), "{odd}");
         }
-        assert!(name().contains("processor"));
+        assert!(machine().contains("processor"));
     }
 }
