@@ -67,7 +67,9 @@ fn pictures(pictures: &Pictures) -> Result<Value> {
     let across = width.div_ceil(TILE);
     let mut worst: Vec<(f64, usize)> = (0..means[0].len())
         .map(|tile| {
-            let [a, b] = [&means[0], &means[1]].map(|means| f64::from(luminance(means[tile])));
+            let [a, b] =
+                [&means[0], &means[1]].map(|means| luminance(means[tile].map(|v| v as f32)));
+            let [a, b] = [a, b].map(f64::from);
             let part = if a > 0.0 { b / a - 1.0 } else { b };
             (part, tile)
         })
@@ -92,7 +94,7 @@ fn pictures(pictures: &Pictures) -> Result<Value> {
 }
 
 /// The mean colours of tiles, row by row.
-fn tiles(image: &Image) -> Vec<[f32; 3]> {
+fn tiles(image: &Image) -> Vec<[f64; 3]> {
     let rgb = image.rgb().unwrap_or([0; 3]);
     let [width, height] = [image.width() as usize, image.height() as usize];
     let across = width.div_ceil(TILE);
