@@ -60,11 +60,6 @@ pub(super) struct MethodArguments {
 }
 
 impl ImageArguments {
-    /// The film's size, where it is asked for.
-    pub(super) fn size(&self) -> Option<(u32, u32)> {
-        self.size
-    }
-
     /// What is written into a description.
     pub(super) fn overrides(&self) -> Overrides {
         Overrides {

@@ -603,7 +603,7 @@ impl<'a> Series<'a> {
         let (budget, session) = (&self.budget, &mut self.session);
         let turns = self.arguments.turntable.is_some();
         let (arguments, up) = (&self.arguments.staging, scene.up_axis());
-        let staging = arguments.staging(up, self.arguments.image.size(), turns);
+        let staging = arguments.staging(up, self.arguments.image.overrides().size, turns);
         let (mut description, text) =
             scene.describe_staged(&item.input, &staging, &options, budget, session)?;
         if let (Some(path), Some(text)) = (&arguments.write_scene, text) {

@@ -5,22 +5,7 @@
 
 use glam::{DMat3, DVec3};
 
-use crate::color::Primaries;
-
-/// The Academy's primaries for interchange.
-const AP0: Primaries = Primaries {
-    red: [0.7347, 0.2653],
-    green: [0.0, 1.0],
-    blue: [0.0001, -0.077],
-    white: [0.32168, 0.33767],
-};
-/// Those for rendering.
-const AP1: Primaries = Primaries {
-    red: [0.713, 0.293],
-    green: [0.165, 0.83],
-    blue: [0.128, 0.044],
-    white: AP0.white,
-};
+use crate::color::{Primaries, adaptation};
 
 /// What the transforms are made of.
 #[derive(Clone, Debug)]
@@ -39,8 +24,9 @@ pub(super) struct Aces {
 impl Aces {
     pub(super) fn new() -> Self {
         let xyz = |primaries: &Primaries| primaries.to_xyz().expect("they are a space");
-        let (ap0, ap1, bt709) = (xyz(&AP0), xyz(&AP1), xyz(&Primaries::BT709));
-        let adapted = bradford(Primaries::BT709.white, AP0.white);
+        let spaces = [Primaries::AP0, Primaries::AP1, Primaries::BT709];
+        let [ap0, ap1, bt709] = spaces.each_ref().map(xyz);
+        let adapted = adaptation(Primaries::BT709.white, Primaries::AP0.white);
         Self {
             from_bt709: ap0.inverse() * adapted * bt709,
             ap0_to_ap1: ap1.inverse() * ap0,
@@ -104,17 +90,6 @@ impl Aces {
         }
         self.xyz_to_ap1 * (xyz * (xyz.y.powf(0.9811) / xyz.y))
     }
-}
-
-/// Bradford's adaptation of XYZ between white points (Lam, 1985).
-fn bradford(from: [f64; 2], to: [f64; 2]) -> DMat3 {
-    const CONES: DMat3 = DMat3::from_cols(
-        DVec3::new(0.8951, -0.7502, 0.0389),
-        DVec3::new(0.2664, 1.7135, -0.0685),
-        DVec3::new(-0.1614, 0.0367, 1.0296),
-    );
-    let white = |[x, y]: [f64; 2]| CONES * DVec3::new(x / y, 1.0, (1.0 - x - y) / y);
-    CONES.inverse() * DMat3::from_diagonal(white(to) / white(from)) * CONES
 }
 
 /// Mean of the channels, and more where they differ.

@@ -260,7 +260,23 @@ pub(super) struct Ask<'a> {
     pub(super) traced: bool,
 }
 
-impl Ask<'_> {
+impl<'a> Ask<'a> {
+    /// For rays to be traced.
+    pub(super) fn traced(
+        shelf: &'a mut Shelf,
+        description: &'a Description,
+        options: &'a Options,
+        progress: &'a dyn Progress,
+    ) -> Self {
+        Self {
+            shelf,
+            description,
+            options,
+            progress,
+            traced: true,
+        }
+    }
+
     /// How rays find shapes, if there are any.
     fn method(&self) -> Method {
         match self.traced {

@@ -324,13 +324,7 @@ impl Session {
         progress: &dyn Progress,
     ) -> Result<Rendered> {
         self.run(options, |shelf| {
-            let ask = Ask {
-                shelf,
-                description,
-                options,
-                progress,
-                traced: true,
-            };
+            let ask = Ask::traced(shelf, description, options, progress);
             Render(ask).run_in(description, options)
         })
     }
@@ -350,13 +344,7 @@ impl Session {
         progress: &dyn Progress,
     ) -> Result<Parted> {
         self.run(options, |shelf| {
-            let ask = Ask {
-                shelf,
-                description,
-                options,
-                progress,
-                traced: true,
-            };
+            let ask = Ask::traced(shelf, description, options, progress);
             Part { ask, passes, path }.run_in(description, options)
         })
     }
@@ -372,13 +360,7 @@ impl Session {
         progress: &dyn Progress,
     ) -> Result<Heat> {
         self.run(options, |shelf| {
-            let ask = Ask {
-                shelf,
-                description,
-                options,
-                progress,
-                traced: true,
-            };
+            let ask = Ask::traced(shelf, description, options, progress);
             Warm(ask).run_in(description, options)
         })
     }
@@ -404,13 +386,7 @@ impl Session {
         progress: &dyn Progress,
     ) -> Result<Facts> {
         self.run(options, |shelf| {
-            let ask = Ask {
-                shelf,
-                description,
-                options,
-                progress,
-                traced: true,
-            };
+            let ask = Ask::traced(shelf, description, options, progress);
             Measure(ask).run_in(description, options)
         })
     }

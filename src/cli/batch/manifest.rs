@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 
 use clap::Parser;
 use etendue::budget::Budget;
@@ -47,7 +48,8 @@ pub(super) struct Unit {
     /// The call of the command, without the output.
     pub(super) arguments: Vec<String>,
     pub(super) item: Item,
-    parsed: render::Arguments,
+    /// The entry's options, of all its images.
+    parsed: Rc<render::Arguments>,
 }
 
 /// The file.
@@ -103,14 +105,15 @@ impl Manifest {
             for values in entry.combinations() {
                 let output = entry.expand(&entry.output, &values);
                 let options: Vec<String> = entry.options(&values).collect();
-                let images = parse(scene, &output, &options)
-                    .and_then(|parsed| parsed.images(budget))
-                    .and_then(|Images { items, failed }| match failed.into_iter().next() {
+                let images = parse(scene, &output, &options).and_then(|parsed| {
+                    let Images { items, failed } = parsed.images(budget)?;
+                    match failed.into_iter().next() {
                         Some((_, error)) => Err(error),
-                        None => Ok(items),
-                    });
-                let items = match images {
-                    Ok(items) => items,
+                        None => Ok((Rc::new(parsed), items)),
+                    }
+                });
+                let (parsed, items) = match images {
+                    Ok(images) => images,
                     Err(error) => {
                         self.failed.push(error.at(location));
                         continue;
@@ -131,7 +134,7 @@ impl Manifest {
                     self.units.push(Unit {
                         arguments,
                         item,
-                        parsed: parse(scene, &output, &options)?,
+                        parsed: Rc::clone(&parsed),
                     });
                     if self.units.len() > MOST {
                         return Err(Error::input(format!("there are more than {MOST} images")));
