@@ -23,7 +23,9 @@ use super::progress::Progress;
 use super::provenance::{self, Provenance};
 use super::uniform;
 use super::{Parted, Rendered, Report, timed};
-use crate::color::{Bands, ColorModel, Comb, MAX_BANDS, Response, Rgb};
+#[cfg(feature = "bands")]
+use crate::color::{Bands, MAX_BANDS};
+use crate::color::{ColorModel, Comb, Response, Rgb};
 use crate::description::Description;
 use crate::error::{Error, Result};
 use crate::film::{Accumulator, Tally};
@@ -59,18 +61,30 @@ pub(super) trait Task: Sized {
     fn run_in(self, description: &Description, options: &Options) -> Result<Self::Output> {
         match Model::of(description, options)? {
             Model::Rgb => self.run(Rgb),
-            Model::Bands(comb, responses) => match comb.count() {
-                ..=8 => self.run(bands::<8>(comb, responses)),
-                9..=16 => self.run(bands::<16>(comb, responses)),
-                17..=32 => self.run(bands::<32>(comb, responses)),
-                _ => self.run(bands::<MAX_BANDS>(comb, responses)),
-            },
+            Model::Bands(comb, responses) => in_bands(self, comb, responses),
         }
     }
 }
 
-fn bands<const N: usize>(comb: Comb, responses: Arc<[Response]>) -> Bands<N> {
-    Bands::new(comb, responses).expect("so many bands fit")
+/// Does a task in bands: the code is compiled for few numbers of them, and lanes beyond those asked for carry nothing.
+#[cfg(feature = "bands")]
+fn in_bands<T: Task>(task: T, comb: Comb, responses: Arc<[Response]>) -> Result<T::Output> {
+    fn bands<const N: usize>(comb: Comb, responses: Arc<[Response]>) -> Bands<N> {
+        Bands::new(comb, responses).expect("so many bands fit")
+    }
+    match comb.count() {
+        ..=8 => task.run(bands::<8>(comb, responses)),
+        9..=16 => task.run(bands::<16>(comb, responses)),
+        17..=32 => task.run(bands::<32>(comb, responses)),
+        _ => task.run(bands::<MAX_BANDS>(comb, responses)),
+    }
+}
+
+#[cfg(not(feature = "bands"))]
+fn in_bands<T: Task>(_: T, _: Comb, _: Arc<[Response]>) -> Result<T::Output> {
+    Err(Error::input(
+        "this program was built without bands: build it with the feature `bands`, which is on by default",
+    ))
 }
 
 /// Makes sure that the scene is in memory and tells of it.

@@ -3,6 +3,7 @@
 
 mod support;
 
+#[cfg(feature = "bands")]
 mod bands;
 mod batch;
 mod channels;
