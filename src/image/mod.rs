@@ -15,6 +15,7 @@ mod pfm;
 mod radiance;
 mod raster;
 mod view;
+pub mod vol;
 
 use std::cell::Cell;
 use std::fs;
