@@ -216,6 +216,19 @@ const MITSUBA: &[(Kind, &[&str])] = &[
             "volprim_rf_basic",
         ],
     ),
+    (Kind::Medium, &["heterogeneous", "homogeneous"]),
+    (
+        Kind::Phase,
+        &[
+            "blendphase",
+            "hg",
+            "isotropic",
+            "rayleigh",
+            "sggx",
+            "tabphase",
+        ],
+    ),
+    (Kind::Volume, &["constvolume", "gridvolume"]),
 ];
 
 /// Whether Mitsuba has a plugin of that name; its textures and spectra are one family.

@@ -27,11 +27,13 @@ pub mod sampler;
 pub mod shape;
 pub mod texture;
 
+pub mod phase;
 pub mod sensor;
 
 pub mod accel;
 pub mod light;
 pub mod material;
+pub mod medium;
 
 pub mod scene;
 

@@ -66,6 +66,10 @@ pub enum Takes {
     Substance,
     /// The same, or a spectrum.
     Index,
+    /// A colour, or a nested volume.
+    Volume,
+    /// A nested medium.
+    Medium,
     /// A nested texture.
     Map,
     /// A nested plugin of that kind, or several.
@@ -195,6 +199,8 @@ impl fmt::Display for Takes {
             Self::Number => f.write_str("float or texture"),
             Self::Substance => f.write_str("float or substance"),
             Self::Index => f.write_str("float, substance or spectrum"),
+            Self::Volume => f.write_str("color or volume"),
+            Self::Medium => f.write_str("medium"),
             Self::Map => f.write_str("texture"),
             Self::Nested(kind) => write!(f, "nested {kind}"),
         }
@@ -366,6 +372,11 @@ pub const fn texture(name: &'static str, preset: f64, about: &'static str) -> Ro
     Row::new(name, Takes::Texture, Preset::Float(preset), about)
 }
 
+/// A colour or a volume.
+pub const fn volume(name: &'static str, preset: f64, about: &'static str) -> Row {
+    Row::new(name, Takes::Volume, Preset::Float(preset), about)
+}
+
 /// A number or a texture of numbers.
 pub const fn number(name: &'static str, preset: f64, about: &'static str) -> Row {
     Row::new(name, Takes::Number, Preset::Float(preset), about)
@@ -379,6 +390,11 @@ pub const fn substance(name: &'static str, preset: &'static str, about: &'static
 /// The same, or a spectrum.
 pub const fn index(name: &'static str, preset: &'static str, about: &'static str) -> Row {
     Row::new(name, Takes::Index, Preset::Text(preset), about)
+}
+
+/// A nested medium, or none.
+pub const fn medium(name: &'static str, about: &'static str) -> Row {
+    Row::new(name, Takes::Medium, Preset::Absent("none"), about)
 }
 
 /// A nested texture, which a scene has to give.

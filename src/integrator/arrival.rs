@@ -49,15 +49,20 @@ impl<C: ColorModel> Arrival<'_, '_, C> {
         }
     }
 
-    /// What is emitted toward the ray's start.
-    pub(super) fn emission(&self) -> Option<C::Sample> {
+    /// Radiance that is emitted toward the ray's start, and the density with which light sampling finds it.
+    pub(super) fn emitted(&self) -> Option<(C::Sample, f32)> {
         let (scene, w) = (self.scene, self.wavelengths);
         let from = self.scattered.map_or(self.ray.origin, |s| s.from);
-        let (radiance, light_pdf) = match self.at {
-            Some(at) => scene.emitted(at, from, w)?,
-            None if self.hides_surroundings => return None,
-            None => scene.surrounding(self.ray, w)?,
-        };
+        match self.at {
+            Some(at) => scene.emitted(at, from, w),
+            None if self.hides_surroundings => None,
+            None => scene.surrounding(self.ray, w),
+        }
+    }
+
+    /// What comes of it, weighted against light sampling.
+    pub(super) fn emission(&self) -> Option<C::Sample> {
+        let (radiance, light_pdf) = self.emitted()?;
         let weight = self
             .scattered
             .map_or(1.0, |s| power(s.pdf, light_pdf * s.light_share));
@@ -89,15 +94,16 @@ impl<C: ColorModel> Arrival<'_, '_, C> {
     }
 }
 
-/// Takes camera rays on to what lies behind surfaces that give light.
+/// Takes those rays that `looks` names on to what lies behind surfaces that give light.
 pub(super) fn look_through_emitters<C: ColorModel>(
     scene: &Scene<C>,
     rays: &mut [Ray],
     hits: &mut [Hit],
+    looks: impl Fn(usize) -> bool,
     cost: &mut Cost,
 ) {
     let mut through: Vec<usize> = (0..hits.len())
-        .filter(|i| scene.gives_light(&hits[*i]))
+        .filter(|i| scene.gives_light(&hits[*i]) && looks(*i))
         .collect();
     let (mut behind, mut found) = (Vec::new(), Vec::new());
     while !through.is_empty() {

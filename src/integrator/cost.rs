@@ -79,6 +79,23 @@ impl Cost {
         self.closest += begin.elapsed();
     }
 
+    /// The first hits of shadow rays, which may go on behind them.
+    pub(super) fn segments<C: ColorModel>(
+        &mut self,
+        scene: &Scene<C>,
+        rays: &[Ray],
+        hits: &mut Vec<Hit>,
+    ) {
+        let begin = Instant::now();
+        let stats = &mut self.stats;
+        stats.shadow_rays += rays.len() as u64;
+        let mut counts = Counts::default();
+        scene.closest(rays, Order::Any, hits, &mut counts);
+        stats.tracing.add(&counts);
+        stats.shadow_tracing.add(&counts);
+        self.occluded += begin.elapsed();
+    }
+
     /// Whether anything lies on each shadow ray.
     pub(super) fn occluded<C: ColorModel>(
         &mut self,

@@ -122,9 +122,9 @@ impl Direct {
         for (slot, met) in wave.met() {
             estimates[slot].alpha = if met { 1.0 } else { 0.0 };
         }
-        wave.arrive(|slot, mut arrival| {
+        wave.arrive(|walker, mut arrival| {
             arrival.hides_surroundings = self.hide_emitters;
-            arrival.add_to(&mut estimates[slot]);
+            arrival.add_to(&mut estimates[walker.slot as usize]);
         });
         let bounces = Bounces {
             decisions: self.emitter_samples + self.bsdf_samples,
@@ -138,7 +138,7 @@ impl Direct {
         };
         wave.shade(first, self.emitter_samples, &mut bounce, light, cost);
         wave.trace(1, false, cost);
-        wave.arrive(|slot, arrival| arrival.add_to(&mut estimates[slot]));
+        wave.arrive(|walker, arrival| arrival.add_to(&mut estimates[walker.slot as usize]));
     }
 }
 

@@ -116,14 +116,24 @@ impl Limits {
         decision: &Decisions<'_, F>,
     ) -> (F::Mask, S) {
         let lit = !throughput.is_black();
-        if depth + 1 < self.rr_depth {
+        if !self.plays(depth) {
             return (lit, throughput);
         }
-        let survival = throughput.max_value() * eta * eta;
-        let survival = survival.min(F::splat(MAX_SURVIVAL));
+        let survival = survival(throughput, eta);
         let lives = lit & decision.survival().lt(survival);
         (lives, throughput * (F::one() / survival))
     }
+
+    /// Whether roulette follows the bounce at `depth`.
+    pub(super) fn plays(&self, depth: u32) -> bool {
+        depth.saturating_add(1) >= self.rr_depth
+    }
+}
+
+/// The probability with which roulette lets paths live.
+#[inline(always)]
+pub(super) fn survival<F: Lanes, S: Spectra<F>>(throughput: S, eta: F) -> F {
+    (throughput.max_value() * eta * eta).min(F::splat(MAX_SURVIVAL))
 }
 
 #[cfg(test)]

@@ -12,6 +12,8 @@ mod direct;
 mod moment;
 mod path;
 mod phong;
+mod volpath;
+mod volpathmis;
 
 mod arrival;
 mod bounce;
@@ -20,9 +22,11 @@ mod layers;
 mod limits;
 mod mis;
 mod runs;
+mod volumetric;
 mod wave;
 
 use crate::color::ColorModel;
+use crate::description::NodeId;
 use crate::family::family;
 use crate::interaction::Ray;
 use crate::sampler::{Sampler, Stream};
@@ -77,6 +81,11 @@ pub trait Estimator<C: ColorModel>: std::fmt::Debug + Send + Sync {
         Vec::new()
     }
 
+    /// Whether light is scattered by participating media.
+    fn renders_media(&self) -> bool {
+        false
+    }
+
     /// Estimates each start, in the order of the starts, in place of what `estimates` held.
     fn estimate(
         &self,
@@ -96,6 +105,8 @@ pub struct Context {
     pub lights: Vec<String>,
     /// Of the camera, for channels that show how its rays spread; without, these are 0.
     pub footprint: Option<Footprint>,
+    /// The node of the medium that the camera stands in.
+    pub medium: Option<NodeId>,
 }
 
 family! {
@@ -108,6 +119,8 @@ family! {
         "moment" => Moment(moment::Moment<C>),
         "path" => Path(path::Path),
         "phong" => Phong(phong::Phong),
+        "volpath" => VolPath(volpath::VolPath),
+        "volpathmis" => VolPathMis(volpathmis::VolPathMis),
     }
 }
 
@@ -124,6 +137,10 @@ pub const FIRST_DIMENSION: u32 = 8;
 impl<C: ColorModel> Estimator<C> for Integrator<C> {
     fn extra_channels(&self) -> Vec<String> {
         (**self).extra_channels()
+    }
+
+    fn renders_media(&self) -> bool {
+        (**self).renders_media()
     }
 
     fn estimate(

@@ -46,6 +46,10 @@ impl<C: ColorModel> Estimator<C> for Moment<C> {
         self.nested.extra_channels()
     }
 
+    fn renders_media(&self) -> bool {
+        self.nested.renders_media()
+    }
+
     fn estimate(
         &self,
         scene: &Scene<C>,

@@ -62,8 +62,8 @@ impl<C: ColorModel> Estimator<C> for Path {
                 break;
             }
             wave.trace(depth, self.hide_emitters, cost);
-            wave.arrive(|slot, mut arrival| {
-                let estimate = &mut estimates[slot];
+            wave.arrive(|walker, mut arrival| {
+                let estimate = &mut estimates[walker.slot as usize];
                 arrival.hides_surroundings = self.hide_emitters && estimate.alpha == 0.0;
                 arrival.add_to(estimate);
             });

@@ -168,7 +168,8 @@ impl<C: ColorModel> Estimator<C> for Phong {
                 break;
             }
             wave.trace(depth, self.hide_emitters, cost);
-            wave.arrive(|slot, mut arrival| {
+            wave.arrive(|walker, mut arrival| {
+                let slot = walker.slot as usize;
                 arrival.hides_surroundings = self.hide_emitters && batch.values[slot].alpha == 0.0;
                 batch.arrive(slot, &arrival);
             });

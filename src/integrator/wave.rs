@@ -15,9 +15,9 @@ use crate::material::Material;
 use crate::sampler::{Sampler, Stream, Streams};
 use crate::scene::Scene;
 
-/// A path on its way, beside its ray.
+/// A path on its way, beside its ray; `M` is what it carries through media.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Walker<C: ColorModel> {
+pub(super) struct Walker<C: ColorModel, M = ()> {
     pub(super) throughput: C::Sample,
     pub(super) wavelengths: C::Wavelengths,
     pub(super) stream: Stream,
@@ -27,45 +27,50 @@ pub(super) struct Walker<C: ColorModel> {
     pub(super) eta: f32,
     /// Where the ray was scattered, unless at the camera or into a delta lobe.
     pub(super) scattered: Option<Scattered>,
+    pub(super) media: M,
 }
 
 /// Things with a ray each.
 #[derive(Debug)]
-struct WithRays<T> {
-    rays: Vec<Ray>,
-    things: Vec<T>,
+pub(super) struct WithRays<T> {
+    pub(super) rays: Vec<Ray>,
+    pub(super) things: Vec<T>,
 }
 
 impl<T> WithRays<T> {
-    fn with_capacity(count: usize) -> Self {
+    pub(super) fn with_capacity(count: usize) -> Self {
         Self {
             rays: Vec::with_capacity(count),
             things: Vec::with_capacity(count),
         }
     }
 
-    fn push(&mut self, ray: Ray, thing: T) {
+    pub(super) fn push(&mut self, ray: Ray, thing: T) {
         self.rays.push(ray);
         self.things.push(thing);
     }
 
-    fn clear(&mut self) {
+    pub(super) fn clear(&mut self) {
         self.rays.clear();
         self.things.clear();
     }
 }
 
 /// What a bounce does with light.
-pub(super) trait Shading<C: ColorModel> {
+pub(super) trait Shading<C: ColorModel, M = ()> {
     /// What is added to an estimate where a shadow ray meets nothing.
     type Shadow;
 
     /// Lights and scatters paths that have met one material. Must be `#[inline(always)]`.
-    fn shade<F: Lanes>(&mut self, block: &Block<'_, C, F>, out: &mut Outcome<'_, C, Self::Shadow>);
+    fn shade<F: Lanes>(
+        &mut self,
+        block: &Block<'_, C, F, M>,
+        out: &mut Outcome<'_, C, Self::Shadow, M>,
+    );
 }
 
 /// Paths that have met one material.
-pub(super) struct Block<'a, C: ColorModel, F: Lanes> {
+pub(super) struct Block<'a, C: ColorModel, F: Lanes, M = ()> {
     pub(super) scene: &'a Scene<C>,
     pub(super) material: &'a Material<C>,
     /// What they have met.
@@ -77,12 +82,13 @@ pub(super) struct Block<'a, C: ColorModel, F: Lanes> {
     streams: Streams<F>,
     /// The bounce's first dimension.
     first: u32,
-    walkers: &'a WithRays<Walker<C>>,
+    walkers: &'a WithRays<Walker<C, M>>,
+    hits: &'a [Hit],
     /// Of the lanes, which walkers they are.
     indices: &'a [u32],
 }
 
-impl<C: ColorModel, F: Lanes> Block<'_, C, F> {
+impl<C: ColorModel, F: Lanes, M> Block<'_, C, F, M> {
     /// The random numbers of the bounce's decision `number`.
     #[inline(always)]
     pub(super) fn decisions(&self, number: u32) -> Decisions<'_, F> {
@@ -91,8 +97,14 @@ impl<C: ColorModel, F: Lanes> Block<'_, C, F> {
 
     /// A lane's path.
     #[inline(always)]
-    pub(super) fn walker(&self, lane: usize) -> &Walker<C> {
+    pub(super) fn walker(&self, lane: usize) -> &Walker<C, M> {
         &self.walkers.things[self.indices[lane] as usize]
+    }
+
+    /// What a lane's path has met.
+    #[inline(always)]
+    pub(super) fn hit(&self, lane: usize) -> &Hit {
+        &self.hits[self.indices[lane] as usize]
     }
 
     /// The products of the indices of refraction that the paths have passed.
@@ -136,17 +148,17 @@ pub(super) struct Ways<F: Lanes, S> {
 
 /// What comes of a bounce.
 #[derive(Debug)]
-pub(super) struct Outcome<'a, C: ColorModel, T> {
-    shadows: &'a mut WithRays<T>,
-    next: &'a mut WithRays<Walker<C>>,
+pub(super) struct Outcome<'a, C: ColorModel, T, M = ()> {
+    pub(super) shadows: &'a mut WithRays<T>,
+    pub(super) next: &'a mut WithRays<Walker<C, M>>,
 }
 
-impl<C: ColorModel, T> Outcome<'_, C, T> {
+impl<C: ColorModel, T, M: Copy> Outcome<'_, C, T, M> {
     /// Asks in lanes that are `lit` whether light can be seen, and if so adds what `shadow` says of the lane.
     #[inline(always)]
     pub(super) fn ask<F: Lanes>(
         &mut self,
-        block: &Block<'_, C, F>,
+        block: &Block<'_, C, F, M>,
         light: &LightSamples<F, C::Columns<F>>,
         lit: F::Mask,
         shadow: impl Fn(usize) -> T,
@@ -168,8 +180,19 @@ impl<C: ColorModel, T> Outcome<'_, C, T> {
     #[inline(always)]
     pub(super) fn send<F: Lanes>(
         &mut self,
-        block: &Block<'_, C, F>,
+        block: &Block<'_, C, F, M>,
         ways: &Ways<F, C::Columns<F>>,
+    ) {
+        self.send_changed(block, ways, |_, _, _| ());
+    }
+
+    /// Sends paths on their way, after a last word on each lane's by whoever knows its direction.
+    #[inline(always)]
+    pub(super) fn send_changed<F: Lanes>(
+        &mut self,
+        block: &Block<'_, C, F, M>,
+        ways: &Ways<F, C::Columns<F>>,
+        change: impl Fn(usize, glam::Vec3, &mut Walker<C, M>),
     ) {
         let at = &block.at;
         let direction = at.frame.to_world(ways.wo);
@@ -187,13 +210,14 @@ impl<C: ColorModel, T> Outcome<'_, C, T> {
             let direction = Vec3::<F>::of(&directions, lane);
             let ray = block.ray(lane, origin, direction, f32::INFINITY);
             let throughput = C::Columns::<F>::of(&throughputs, lane);
-            let walker = Walker {
+            let mut walker = Walker {
                 throughput,
                 wavelengths: C::narrowed(&block.walker(lane).wavelengths, &throughput),
                 eta: etas[lane],
                 scattered,
                 ..*block.walker(lane)
             };
+            change(lane, direction, &mut walker);
             self.next.push(ray, walker);
         }
     }
@@ -238,12 +262,12 @@ const SHADOWS: usize = 1 << 14;
 
 /// Paths of a batch, and what they have met; `T` is what belongs to a shadow ray.
 #[derive(Debug)]
-pub(super) struct Wave<'a, C: ColorModel, T> {
+pub(super) struct Wave<'a, C: ColorModel, T, M = ()> {
     scene: &'a Scene<C>,
     sampler: &'a Sampler,
-    walkers: WithRays<Walker<C>>,
+    walkers: WithRays<Walker<C, M>>,
     hits: Vec<Hit>,
-    next: WithRays<Walker<C>>,
+    next: WithRays<Walker<C, M>>,
     shadows: WithRays<T>,
     blocked: Vec<bool>,
     /// Those that have met a surface, by material.
@@ -253,6 +277,18 @@ pub(super) struct Wave<'a, C: ColorModel, T> {
 impl<'a, C: ColorModel, T> Wave<'a, C, T> {
     /// At the camera.
     pub(super) fn new(scene: &'a Scene<C>, sampler: &'a Sampler, starts: &[Start<C>]) -> Self {
+        Self::carrying(scene, sampler, starts, |_| ())
+    }
+}
+
+impl<'a, C: ColorModel, T, M: Copy> Wave<'a, C, T, M> {
+    /// At the camera, with what paths carry through media.
+    pub(super) fn carrying(
+        scene: &'a Scene<C>,
+        sampler: &'a Sampler,
+        starts: &[Start<C>],
+        media: impl Fn(&Start<C>) -> M,
+    ) -> Self {
         let mut walkers = WithRays::with_capacity(starts.len());
         for (slot, start) in (0..).zip(starts) {
             let walker = Walker {
@@ -262,6 +298,7 @@ impl<'a, C: ColorModel, T> Wave<'a, C, T> {
                 slot,
                 eta: 1.0,
                 scattered: None,
+                media: media(start),
             };
             walkers.push(start.ray, walker);
         }
@@ -285,11 +322,46 @@ impl<'a, C: ColorModel, T> Wave<'a, C, T> {
     /// Traces rays that have bounced `depth` times; those of the camera go on to what lies behind emitters where these are
     /// hidden.
     pub(super) fn trace(&mut self, depth: u32, hide_emitters: bool, cost: &mut Cost) {
-        let (rays, hits) = (&mut self.walkers.rays, &mut self.hits);
-        cost.closest(self.scene, depth, rays, hits);
-        if depth == 0 && hide_emitters {
-            look_through_emitters(self.scene, rays, hits, cost);
+        self.trace_looking(depth, depth == 0 && hide_emitters, |_| true, cost);
+    }
+
+    /// Traces rays that have bounced `depth` times; where `looks` says so some of them go on to what lies behind emitters.
+    pub(super) fn trace_looking(
+        &mut self,
+        depth: u32,
+        hide_emitters: bool,
+        looks: impl Fn(&M) -> bool,
+        cost: &mut Cost,
+    ) {
+        self.next.clear();
+        let WithRays { rays, things } = &mut self.walkers;
+        cost.closest(self.scene, depth, rays, &mut self.hits);
+        if hide_emitters {
+            let looks = |i: usize| looks(&things[i].media);
+            look_through_emitters(self.scene, rays, &mut self.hits, looks, cost);
         }
+    }
+
+    /// What is done with paths before they come to what they have met: they are given with their rays, their hits and
+    /// what a bounce adds to. Those of which `stopped` tells in the end go no further.
+    pub(super) fn before(
+        &mut self,
+        stopped: &mut Vec<bool>,
+        act: impl FnOnce(&mut WithRays<Walker<C, M>>, &[Hit], Outcome<'_, C, T, M>, &mut [bool]),
+    ) {
+        stopped.clear();
+        stopped.resize(self.walkers.things.len(), false);
+        let out = Outcome {
+            shadows: &mut self.shadows,
+            next: &mut self.next,
+        };
+        act(&mut self.walkers, &self.hits, out, stopped);
+        let mut kept = stopped.iter().map(|stopped| !stopped);
+        self.walkers.rays.retain(|_| kept.next().unwrap_or(true));
+        let mut kept = stopped.iter().map(|stopped| !stopped);
+        self.walkers.things.retain(|_| kept.next().unwrap_or(true));
+        let mut kept = stopped.iter().map(|stopped| !stopped);
+        self.hits.retain(|_| kept.next().unwrap_or(true));
     }
 
     /// The slots of paths, and whether each has met a surface.
@@ -299,7 +371,7 @@ impl<'a, C: ColorModel, T> Wave<'a, C, T> {
     }
 
     /// Tells of each ray's end that may bring light, and of its path's slot.
-    pub(super) fn arrive(&self, mut take: impl FnMut(usize, Arrival<'_, '_, C>)) {
+    pub(super) fn arrive(&self, mut take: impl FnMut(&Walker<C, M>, Arrival<'_, '_, C>)) {
         let scene = self.scene;
         let walkers = self.walkers.things.iter().zip(&self.walkers.rays);
         for ((walker, ray), hit) in walkers.zip(&self.hits) {
@@ -321,18 +393,40 @@ impl<'a, C: ColorModel, T> Wave<'a, C, T> {
                 scattered: walker.scattered,
                 hides_surroundings: false,
             };
-            take(walker.slot as usize, arrival);
+            take(walker, arrival);
         }
     }
 
     /// Shades what was met, with random numbers from dimension `first` on and up to `shadows` shadow rays a path. Tells
     /// `shading` of those rays that nothing stands in the way of. The paths that were sent on are those that are next.
-    pub(super) fn shade<S: Shading<C, Shadow = T>>(
+    pub(super) fn shade<S: Shading<C, M, Shadow = T>>(
         &mut self,
         first: u32,
         shadows: u32,
         shading: &mut S,
         mut light: impl FnMut(&mut S, &T),
+        cost: &mut Cost,
+    ) {
+        let (scene, mut blocked) = (self.scene, std::mem::take(&mut self.blocked));
+        let settle = |shading: &mut S, shadows: &mut WithRays<T>, cost: &mut Cost| {
+            cost.occluded(scene, &shadows.rays, &mut blocked);
+            for (shadow, blocked) in shadows.things.iter().zip(&blocked) {
+                if !blocked {
+                    light(shading, shadow);
+                }
+            }
+        };
+        self.shade_and(first, shadows, shading, settle, cost);
+        self.blocked = blocked;
+    }
+
+    /// The same; what becomes of shadow rays is for `settle` to say.
+    pub(super) fn shade_and<S: Shading<C, M, Shadow = T>>(
+        &mut self,
+        first: u32,
+        shadows: u32,
+        shading: &mut S,
+        mut settle: impl FnMut(&mut S, &mut WithRays<T>, &mut Cost),
         cost: &mut Cost,
     ) {
         let scene = self.scene;
@@ -342,7 +436,6 @@ impl<'a, C: ColorModel, T> Wave<'a, C, T> {
         }));
         let count = self.runs.count();
         cost.stats.shaded += count as u64;
-        self.next.clear();
         let part = (SHADOWS / shadows.max(1) as usize).next_multiple_of(MAX_LANES);
         let mut done = 0;
         while done < count {
@@ -361,12 +454,7 @@ impl<'a, C: ColorModel, T> Wave<'a, C, T> {
                 },
             };
             C::run(scene.tracer().kernel(), blocks);
-            cost.occluded(scene, &self.shadows.rays, &mut self.blocked);
-            for (shadow, blocked) in self.shadows.things.iter().zip(&self.blocked) {
-                if !blocked {
-                    light(shading, shadow);
-                }
-            }
+            settle(shading, &mut self.shadows, cost);
             self.shadows.clear();
             done = end;
         }
@@ -375,19 +463,19 @@ impl<'a, C: ColorModel, T> Wave<'a, C, T> {
 }
 
 /// Runs of paths that are to be shaded.
-struct Blocks<'a, C: ColorModel, S: Shading<C>, R> {
+struct Blocks<'a, C: ColorModel, M, S: Shading<C, M>, R> {
     scene: &'a Scene<C>,
     sampler: &'a Sampler,
     first: u32,
-    walkers: &'a WithRays<Walker<C>>,
+    walkers: &'a WithRays<Walker<C, M>>,
     hits: &'a [Hit],
     runs: R,
     shading: &'a mut S,
-    out: Outcome<'a, C, S::Shadow>,
+    out: Outcome<'a, C, S::Shadow, M>,
 }
 
-impl<'a, C: ColorModel, S: Shading<C>, R: Iterator<Item = (usize, &'a [u32])>> Task
-    for Blocks<'a, C, S, R>
+impl<'a, C: ColorModel, M: Copy, S: Shading<C, M>, R: Iterator<Item = (usize, &'a [u32])>> Task
+    for Blocks<'a, C, M, S, R>
 {
     type Output = ();
 
@@ -424,6 +512,7 @@ impl<'a, C: ColorModel, S: Shading<C>, R: Iterator<Item = (usize, &'a [u32])>> T
                     streams: Streams::of(&streams[..indices.len()]),
                     first: self.first,
                     walkers: self.walkers,
+                    hits: self.hits,
                     indices,
                 };
                 self.shading.shade(&block, &mut self.out);

@@ -49,6 +49,10 @@ impl<C: ColorModel> Bsdf<C> for BlendBsdf<C> {
         }
     }
 
+    fn passes(&self) -> bool {
+        self.nested.iter().any(|nested| nested.passes())
+    }
+
     single_face!();
 
     fn ambient(&self, at: &Interaction<'_>, wi: glam::Vec3, w: &C::Wavelengths) -> C::Sample {
@@ -75,6 +79,20 @@ impl<C: ColorModel> BlockBsdf<C> for BlendBsdf<C> {
             value: first.value * rest + second.value * weight,
             pdf: first.pdf * rest + second.pdf * weight,
         }
+    }
+
+    #[inline(always)]
+    fn passing_lanes<F: Lanes>(
+        &self,
+        at: &Points<'_, F>,
+        wi: Vec3<F>,
+        w: &[C::Wavelengths],
+    ) -> BsdfValues<F, C::Columns<F>> {
+        let weight = self.weight.numbers(at).clamp(0.0, 1.0);
+        let [first, second] = &self.nested;
+        let second = second.passing_lanes(at, wi, w);
+        let first = first.passing_lanes(at, wi, w);
+        first.mixed(F::one() - weight, second, weight)
     }
 
     #[inline(always)]

@@ -52,6 +52,15 @@ impl<F: Lanes, S: Spectra<F>> BsdfValues<F, S> {
         Self::select(mask, self, Self::none())
     }
 
+    /// The mean of two with these shares.
+    #[inline(always)]
+    pub(super) fn mixed(self, share: F, other: Self, other_share: F) -> Self {
+        Self {
+            value: self.value * share + other.value * other_share,
+            pdf: self.pdf * share + other.pdf * other_share,
+        }
+    }
+
     /// `yes` where the mask is set, else `no`.
     #[inline(always)]
     pub(super) fn select(mask: F::Mask, yes: Self, no: Self) -> Self {
@@ -178,6 +187,17 @@ pub(super) trait BlockBsdf<C: ColorModel> {
         w: &[C::Wavelengths],
     ) -> BsdfSamples<F, C::Columns<F>>;
 
+    /// See [`Material::passing_lanes`].
+    #[inline(always)]
+    fn passing_lanes<F: Lanes>(
+        &self,
+        _at: &Points<'_, F>,
+        _wi: Vec3<F>,
+        _w: &[C::Wavelengths],
+    ) -> BsdfValues<F, C::Columns<F>> {
+        BsdfValues::none()
+    }
+
     /// Its terms of Phong's equation, if it has a part in it.
     #[inline(always)]
     fn phong_lanes<F: Lanes>(
@@ -296,6 +316,22 @@ impl<C: ColorModel, F: Lanes> Visitor<C> for Eval<'_, C, F> {
     }
 }
 
+/// See [`BlockBsdf::passing_lanes`].
+struct Pass<'a, C: ColorModel, F: Lanes> {
+    at: &'a Points<'a, F>,
+    wi: Vec3<F>,
+    w: &'a [C::Wavelengths],
+}
+
+impl<C: ColorModel, F: Lanes> Visitor<C> for Pass<'_, C, F> {
+    type Output = BsdfValues<F, C::Columns<F>>;
+
+    #[inline(always)]
+    fn visit<B: BlockBsdf<C>>(self, bsdf: &B) -> Self::Output {
+        bsdf.passing_lanes(self.at, self.wi, self.w)
+    }
+}
+
 /// See [`BlockBsdf::phong_lanes`].
 struct Terms<'a, C: ColorModel, F: Lanes>(Pairs<'a, C, F>);
 
@@ -339,6 +375,18 @@ impl<C: ColorModel> Material<C> {
         w: &[C::Wavelengths],
     ) -> BsdfValues<F, C::Columns<F>> {
         F::call(Ask(self, Eval(Pairs { at, wi, wo, w })))
+    }
+
+    /// The share of light along `wi` that goes straight on as if nothing were there, and the probability with which
+    /// [`Material::sample_lanes`] lets it.
+    #[inline(always)]
+    pub fn passing_lanes<F: Lanes>(
+        &self,
+        at: &Points<'_, F>,
+        wi: Vec3<F>,
+        w: &[C::Wavelengths],
+    ) -> BsdfValues<F, C::Columns<F>> {
+        F::call(Ask(self, Pass { at, wi, w }))
     }
 
     /// The material's part in Phong's equation. One that has none there gives π times its value, so that a matte one has

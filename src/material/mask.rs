@@ -49,6 +49,10 @@ impl<C: ColorModel> Bsdf<C> for Mask<C> {
         }
     }
 
+    fn passes(&self) -> bool {
+        true
+    }
+
     single_face!();
 
     fn ambient(&self, at: &Interaction<'_>, wi: glam::Vec3, w: &C::Wavelengths) -> C::Sample {
@@ -71,6 +75,22 @@ impl<C: ColorModel> BlockBsdf<C> for Mask<C> {
             value: values.value * opacity,
             pdf: values.pdf * opacity,
         }
+    }
+
+    #[inline(always)]
+    fn passing_lanes<F: Lanes>(
+        &self,
+        at: &Points<'_, F>,
+        wi: Vec3<F>,
+        w: &[C::Wavelengths],
+    ) -> BsdfValues<F, C::Columns<F>> {
+        let opacity = self.opacity.numbers(at).clamp(0.0, 1.0);
+        let all = BsdfValues {
+            value: C::Columns::<F>::splat(F::one()),
+            pdf: F::one(),
+        };
+        let nested = self.nested.passing_lanes(at, wi, w);
+        nested.mixed(opacity, all, F::one() - opacity)
     }
 
     #[inline(always)]

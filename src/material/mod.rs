@@ -98,6 +98,11 @@ pub trait Bsdf<C: ColorModel>: std::fmt::Debug + Send + Sync {
         self.lobes().smooth
     }
 
+    /// Whether light may go straight on through it as if nothing were there: see [`Material::passing_lanes`].
+    fn passes(&self) -> bool {
+        false
+    }
+
     /// The value and density of a pair of directions; none where all lobes are single directions.
     fn eval(
         &self,

@@ -1,6 +1,6 @@
 //! `null`: a surface that light passes as if it were not there.
 
-use super::{BlockBsdf, Bsdf, BsdfSamples, Lobes, single_face};
+use super::{BlockBsdf, Bsdf, BsdfSamples, BsdfValues, Lobes, single_face};
 use crate::color::{ColorModel, Spectra};
 use crate::description::Properties;
 use crate::description::declared::Plugin;
@@ -35,10 +35,27 @@ impl<C: ColorModel> Bsdf<C> for Null {
         }
     }
 
+    fn passes(&self) -> bool {
+        true
+    }
+
     single_face!();
 }
 
 impl<C: ColorModel> BlockBsdf<C> for Null {
+    #[inline(always)]
+    fn passing_lanes<F: Lanes>(
+        &self,
+        _at: &Points<'_, F>,
+        _wi: Vec3<F>,
+        _w: &[C::Wavelengths],
+    ) -> BsdfValues<F, C::Columns<F>> {
+        BsdfValues {
+            value: C::Columns::<F>::splat(F::one()),
+            pdf: F::one(),
+        }
+    }
+
     #[inline(always)]
     fn sample_lanes<F: Lanes>(
         &self,

@@ -119,6 +119,10 @@ impl<C: ColorModel, N: Normals> Bsdf<C> for Perturbed<C, N> {
         self.nested.lobes()
     }
 
+    fn passes(&self) -> bool {
+        self.nested.passes()
+    }
+
     single_face!();
 
     fn ambient(&self, at: &Interaction<'_>, wi: glam::Vec3, w: &C::Wavelengths) -> C::Sample {
@@ -147,6 +151,18 @@ impl<C: ColorModel, N: Normals> BlockBsdf<C> for Perturbed<C, N> {
             ..values
         };
         values.only(F::zero().lt(inner_wo.z * wo.z))
+    }
+
+    #[inline(always)]
+    fn passing_lanes<F: Lanes>(
+        &self,
+        at: &Points<'_, F>,
+        wi: Vec3<F>,
+        w: &[C::Wavelengths],
+    ) -> BsdfValues<F, C::Columns<F>> {
+        let frames = self.frames(at, wi);
+        let (inner, inner_wi) = turned(at, &frames, wi);
+        self.nested.passing_lanes(&inner, inner_wi, w)
     }
 
     #[inline(always)]

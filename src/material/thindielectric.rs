@@ -4,8 +4,10 @@
 //! `specular_transmittance` (1) multiply.
 
 use super::dispersion::Dispersion;
-use super::{BlockBsdf, Bsdf, BsdfSamples, Lobes, dielectric, fresnel, ior, single_face};
-use crate::color::{ColorModel, Spectra as _};
+use super::{
+    BlockBsdf, Bsdf, BsdfSamples, BsdfValues, Lobes, dielectric, fresnel, ior, single_face,
+};
+use crate::color::{ColorModel, Spectra};
 use crate::description::Properties;
 use crate::description::declared::Plugin;
 use crate::error::Result;
@@ -50,10 +52,40 @@ impl<C: ColorModel> Bsdf<C> for ThinDielectric<C> {
         }
     }
 
+    fn passes(&self) -> bool {
+        true
+    }
+
     single_face!();
 }
 
 impl<C: ColorModel> BlockBsdf<C> for ThinDielectric<C> {
+    #[inline(always)]
+    fn passing_lanes<F: Lanes>(
+        &self,
+        at: &Points<'_, F>,
+        wi: Vec3<F>,
+        w: &[C::Wavelengths],
+    ) -> BsdfValues<F, C::Columns<F>> {
+        let transmittance = self.specular_transmittance.eval_lanes(at, w);
+        if let Some(dispersion) = &self.dispersion {
+            let reflectances = Self::reflectances(dispersion, wi, w);
+            let mut rests = C::Columns::<F>::zero();
+            for channel in 0..C::Columns::<F>::CHANNELS {
+                rests.set(channel, F::one() - reflectances[channel]);
+            }
+            return BsdfValues {
+                value: transmittance * rests,
+                pdf: F::one() - dispersion.mean(reflectances),
+            };
+        }
+        let rest = F::one() - twice(fresnel::dielectric(wi.z.abs(), self.eta).reflectance);
+        BsdfValues {
+            value: transmittance * rest,
+            pdf: rest,
+        }
+    }
+
     #[inline(always)]
     fn sample_lanes<F: Lanes>(
         &self,
@@ -66,8 +98,7 @@ impl<C: ColorModel> BlockBsdf<C> for ThinDielectric<C> {
         if let Some(dispersion) = &self.dispersion {
             return self.sample_dispersed(dispersion, at, wi, u1, w);
         }
-        let once = fresnel::dielectric(wi.z.abs(), self.eta).reflectance;
-        let reflectance = (once + once) / (F::one() + once);
+        let reflectance = twice(fresnel::dielectric(wi.z.abs(), self.eta).reflectance);
         let reflected = BsdfSamples::delta(
             F::Mask::splat(true),
             fresnel::mirror(wi),
@@ -80,7 +111,29 @@ impl<C: ColorModel> BlockBsdf<C> for ThinDielectric<C> {
     }
 }
 
+/// What both sides of a thin plate reflect, with all that goes to and fro between them, where one reflects `once`.
+#[inline(always)]
+fn twice<F: Lanes>(once: F) -> F {
+    (once + once) / (F::one() + once)
+}
+
 impl<C: ColorModel> ThinDielectric<C> {
+    /// What is reflected of each wavelength.
+    #[inline(always)]
+    fn reflectances<F: Lanes>(
+        dispersion: &Dispersion<C>,
+        wi: Vec3<F>,
+        w: &[C::Wavelengths],
+    ) -> C::Columns<F> {
+        let indices = dispersion.indices::<F>(w);
+        let mut reflectances = C::Columns::<F>::zero();
+        for channel in 0..C::Columns::<F>::CHANNELS {
+            let once = fresnel::dielectric_lanes(wi.z.abs(), indices[channel]).reflectance;
+            reflectances.set(channel, twice(once));
+        }
+        reflectances
+    }
+
     /// Samples where each wavelength has its own share of what is reflected.
     #[inline(always)]
     fn sample_dispersed<F: Lanes>(
@@ -92,13 +145,10 @@ impl<C: ColorModel> ThinDielectric<C> {
         w: &[C::Wavelengths],
     ) -> BsdfSamples<F, C::Columns<F>> {
         let one = F::one();
-        let indices = dispersion.indices::<F>(w);
-        let (mut reflectances, mut rests) = (C::Columns::<F>::zero(), C::Columns::<F>::zero());
+        let reflectances = Self::reflectances(dispersion, wi, w);
+        let mut rests = C::Columns::<F>::zero();
         for channel in 0..C::Columns::<F>::CHANNELS {
-            let once = fresnel::dielectric_lanes(wi.z.abs(), indices[channel]).reflectance;
-            let reflectance = (once + once) / (one + once);
-            reflectances.set(channel, reflectance);
-            rests.set(channel, one - reflectance);
+            rests.set(channel, one - reflectances[channel]);
         }
         let mean = dispersion.mean(reflectances);
         let reflected = BsdfSamples::delta(

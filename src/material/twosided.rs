@@ -71,6 +71,10 @@ impl<C: ColorModel> Bsdf<C> for TwoSided<C> {
         }
     }
 
+    fn passes(&self) -> bool {
+        self.front.passes() || self.back.as_ref().is_some_and(|back| back.passes())
+    }
+
     single_face!();
 
     fn ambient(&self, at: &Interaction<'_>, wi: glam::Vec3, w: &C::Wavelengths) -> C::Sample {
@@ -104,6 +108,22 @@ impl<C: ColorModel> BlockBsdf<C> for TwoSided<C> {
                 BsdfValues::select(behind, back.eval_lanes(at, wi, wo, w), front)
             }
             _ => front,
+        }
+    }
+
+    #[inline(always)]
+    fn passing_lanes<F: Lanes>(
+        &self,
+        at: &Points<'_, F>,
+        wi: Vec3<F>,
+        w: &[C::Wavelengths],
+    ) -> BsdfValues<F, C::Columns<F>> {
+        let behind = wi.z.lt(F::zero());
+        let wi = Self::turned(behind, wi);
+        let front = self.front.passing_lanes(at, wi, w);
+        match &self.back {
+            Some(back) => BsdfValues::select(behind, back.passing_lanes(at, wi, w), front),
+            None => front,
         }
     }
 

@@ -15,10 +15,13 @@ use crate::filter::Filter;
 use crate::integrator::Integrator;
 use crate::light::Light;
 use crate::material::Material;
+use crate::medium::Medium;
+use crate::phase::Phase;
 use crate::sampler::Sampler;
 use crate::sensor::{FILMS, Sensor};
 use crate::shape;
 use crate::texture::Texture;
+use crate::texture::volume::Volume;
 
 /// A plugin that a scene can name.
 #[derive(Clone, Copy, Debug)]
@@ -78,7 +81,7 @@ pub fn plugins() -> Vec<Listed> {
             own: kind != Kind::Scene && !is_mitsubas(kind, name),
         }
     };
-    let families: [(Kind, Plugins); 8] = [
+    let families: [(Kind, Plugins); 11] = [
         (Kind::Integrator, Integrator::<Rgb>::PLUGINS),
         (Kind::Sensor, Sensor::PLUGINS),
         (Kind::Film, FILMS),
@@ -87,6 +90,9 @@ pub fn plugins() -> Vec<Listed> {
         (Kind::Bsdf, Material::<Rgb>::PLUGINS),
         (Kind::Texture, Texture::<Rgb>::PLUGINS),
         (Kind::Emitter, Light::<Rgb>::PLUGINS),
+        (Kind::Medium, Medium::<Rgb>::PLUGINS),
+        (Kind::Phase, Phase::PLUGINS),
+        (Kind::Volume, Volume::<Rgb>::PLUGINS),
     ];
     let mut all = vec![listed(Kind::Scene)(("scene", &SCENE))];
     for (kind, plugins) in families {
@@ -329,6 +335,7 @@ mod tests {
             Takes::Float
             | Takes::Color
             | Takes::Texture
+            | Takes::Volume
             | Takes::Number
             | Takes::Substance
             | Takes::Index => match (row.takes, name) {
@@ -361,7 +368,7 @@ mod tests {
                 format!("<transform name='{name}'><translate x='1'/></transform>")
             }
             Takes::Map => format!("<texture name='{name}' type='checkerboard'/>"),
-            Takes::Nested(_) => String::new(),
+            Takes::Nested(_) | Takes::Medium => String::new(),
         }
     }
 
@@ -374,6 +381,7 @@ mod tests {
             (Kind::Shape, "instance") => "<shape type='shapegroup'><shape type='sphere'/></shape>",
             (Kind::Shape, "group" | "shapegroup") => "<shape type='sphere'/>",
             (Kind::Integrator, "moment") => "<integrator type='path'/>",
+            (Kind::Phase, "blendphase") => "<phase type='hg'/><phase type='hg'/>",
             (Kind::Film, "specfilm") => "<spectrum name='red' value='550:0, 600:1, 650:0'/>",
             _ => "",
         }
@@ -397,6 +405,21 @@ mod tests {
             Kind::Emitter if plugin.contains("'area'") => {
                 format!("<shape type='sphere'>{plugin}</shape>{}", sensor(""))
             }
+            Kind::Medium => {
+                let named = plugin.replacen("<medium", "<medium name='interior'", 1);
+                format!("<shape type='sphere'>{named}</shape>{}", sensor(""))
+            }
+            Kind::Phase => around(
+                Kind::Medium,
+                &format!("<medium type='homogeneous'>{plugin}</medium>"),
+            ),
+            Kind::Volume => {
+                let named = plugin.replacen("<volume", "<volume name='albedo'", 1);
+                around(
+                    Kind::Medium,
+                    &format!("<medium type='homogeneous'>{named}</medium>"),
+                )
+            }
             Kind::Sensor => plugin.to_owned(),
             _ => format!("{plugin}{}", sensor("")),
         }
@@ -414,6 +437,14 @@ mod tests {
         std::fs::write(path("m.obj"), mesh).unwrap();
         let image = crate::image::Image::new(4, 3, ["R", "G", "B"].map(String::from).to_vec());
         crate::image::write(&path("i.exr"), &image, &Default::default()).unwrap();
+        let mut grid = b"VOL\x03".to_vec();
+        grid.extend([1_u32, 1, 1, 1, 1].map(u32::to_le_bytes).concat());
+        grid.extend(
+            [0.0_f32, 0.0, 0.0, 1.0, 1.0, 1.0, 0.5]
+                .map(f32::to_le_bytes)
+                .concat(),
+        );
+        std::fs::write(path("g.vol"), grid).unwrap();
         let mut unread = Vec::new();
         for Listed {
             kind, name, plugin, ..
@@ -422,7 +453,7 @@ mod tests {
             if kind == Kind::Scene {
                 continue;
             }
-            let read = |row: &&Row| !matches!(row.takes, Takes::Nested(_));
+            let read = |row: &&Row| !matches!(row.takes, Takes::Nested(_) | Takes::Medium);
             let rows = || plugin.rows().filter(read);
             for row in rows().map(Some).chain([None]) {
                 let together = |other: &Row| {
@@ -447,6 +478,7 @@ mod tests {
                 }
                 let file = match name {
                     "bitmap" | "envmap" => "i.exr",
+                    "gridvolume" => "g.vol",
                     _ => "m.obj",
                 };
                 let text = format!(

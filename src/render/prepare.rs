@@ -3,6 +3,7 @@
 //! the next render, which may be of another view or frame.
 
 use std::any::Any;
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
@@ -172,6 +173,9 @@ pub(super) fn view<C: ColorModel>(description: &Description, sensor: NodeId) -> 
         Some(child) => {
             let context = integrator::Context {
                 lights: scene::light_names(description),
+                medium: properties
+                    .child(Kind::Medium)?
+                    .map(|medium| medium.node_id()),
                 footprint: sensor
                     .as_ref()
                     .zip(film.as_ref())
@@ -187,6 +191,9 @@ pub(super) fn view<C: ColorModel>(description: &Description, sensor: NodeId) -> 
         None => (Some(Integrator::default()), "path".to_owned()),
     };
     problems.finish()?;
+    if integrator.as_ref().is_some_and(|i| !i.renders_media()) {
+        warnings.extend(media(description, &integrator_name));
+    }
     let missing = "a part that is missing is a problem";
     Ok(View {
         sensor: sensor.expect(missing),
@@ -196,6 +203,26 @@ pub(super) fn view<C: ColorModel>(description: &Description, sensor: NodeId) -> 
         integrator_name,
         warnings,
     })
+}
+
+/// The warning that an integrator does not render participating media, where a scene has any.
+fn media(description: &Description, integrator: &str) -> Option<Problem> {
+    let (mut seen, mut media) = (HashSet::new(), Vec::new());
+    let mut shapes = description.root().children(Kind::Shape);
+    while let Some(shape) = shapes.pop() {
+        if seen.insert(shape.node_id()) {
+            shapes.extend(shape.children(Kind::Shape));
+            media.extend(shape.children(Kind::Medium));
+        }
+    }
+    let first = media.iter().min_by_key(|medium| medium.node_id())?;
+    let message = format!(
+        "{integrator} does not render participating media: {} shapes count as empty",
+        media.len()
+    );
+    let warning = Error::unsupported(message).at(first.location());
+    let warning = warning.help("--integrator volpath does");
+    warning.problems().first().cloned()
 }
 
 /// What is wrong with the sensors that are not `chosen`: all of a scene is checked, whoever looks at it. What Étendue

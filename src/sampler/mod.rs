@@ -267,3 +267,33 @@ impl<F: Lanes> Streams<F> {
         Self { key, index }
     }
 }
+
+impl<F: Lanes> Streams<F> {
+    /// As many numbers as are wanted, which no sampler places; those of each dimension are others.
+    #[inline(always)]
+    pub fn draws(&self, dimension: u32) -> Draws<F> {
+        let key = random::bits_along(random::bits(self.key, dimension), self.index);
+        Draws { key }
+    }
+}
+
+/// Numbers of paths in lanes, as many as are wanted.
+#[derive(Clone, Copy, Debug)]
+pub struct Draws<F: Lanes> {
+    key: Long<F::Int>,
+}
+
+impl<F: Lanes> Draws<F> {
+    /// Each path's number `index`, in [0, 1).
+    #[inline(always)]
+    pub fn number(&self, index: u32) -> F {
+        random::unit(random::bits(self.key, index).high)
+    }
+
+    /// Others, as many again.
+    #[inline(always)]
+    pub fn part(&self, index: u32) -> Self {
+        let key = random::mix(random::bits(self.key, index) + Long::splat(1));
+        Self { key }
+    }
+}

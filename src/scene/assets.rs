@@ -85,7 +85,7 @@ impl Assets {
                 loaded();
             }
         });
-        let mut warnings: Vec<Problem> = media(&shapes).into_iter().collect();
+        let mut warnings = Vec::new();
         let mut members = Vec::with_capacity(shapes.len());
         let mut files = BTreeSet::new();
         for (Planned { properties, space }, result) in shapes.iter().zip(results) {
@@ -136,20 +136,6 @@ impl Assets {
         let shapes: usize = self.shapes.iter().map(|s| s.geometry.bytes()).sum();
         shapes + self.instances.len() * size_of::<Instance>()
     }
-}
-
-/// The warning for participating media, which shapes may enclose and Étendue does not render.
-fn media(shapes: &[Planned<'_>]) -> Option<Problem> {
-    let media: Vec<_> = shapes
-        .iter()
-        .flat_map(|shape| shape.properties.children(Kind::Medium))
-        .collect();
-    let message = format!(
-        "participating media are not rendered: {} shapes count as empty",
-        media.len()
-    );
-    let warning = Error::unsupported(message).at(media.first()?.location());
-    warning.problems().first().cloned()
 }
 
 /// A shape that is to be loaded.

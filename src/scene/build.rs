@@ -5,18 +5,22 @@ use std::collections::{HashMap, HashSet};
 
 use super::assets::{MAX_SHAPES, Member};
 use super::choice::Choice;
-use super::{Assets, LightId, MaterialId, Scene, Surfacing};
+use super::{Assets, Boundary, LightId, MaterialId, MediumId, Scene, Surfacing};
 use crate::accel::{Recipe, Tracer};
 use crate::color::ColorModel;
 use crate::description::{Description, Kind, NodeId, Properties, Value};
 use crate::error::{Error, Problems, Result};
 use crate::light::{self, Light, LightContext};
 use crate::material::Material;
+use crate::medium::Medium;
 use crate::shape::{self, Geometry};
 use crate::texture::Palettes;
 
 /// The light that stands on a shape.
 const AREA: &str = "area";
+/// What the media of a shape are called.
+const INTERIOR: &str = "interior";
+const EXTERIOR: &str = "exterior";
 
 /// What is made while a scene is built.
 struct Builder<'d, C: ColorModel> {
@@ -31,6 +35,9 @@ struct Builder<'d, C: ColorModel> {
     /// The lights that stand on shapes, by node.
     worn: HashSet<NodeId>,
     ambients: Vec<Light<C>>,
+    media: Vec<Medium<C>>,
+    /// The media that were made already, by node.
+    known_media: HashMap<NodeId, MediumId>,
     problems: Problems,
 }
 
@@ -50,6 +57,33 @@ impl<C: ColorModel> Builder<'_, C> {
         let id = self.add_material(material);
         self.known.insert(properties.node_id(), id);
         Some(id)
+    }
+
+    fn medium(&mut self, properties: &Properties<'_>) -> Option<MediumId> {
+        if let Some(id) = self.known_media.get(&properties.node_id()) {
+            return Some(*id);
+        }
+        let medium = Medium::build(properties, &self.palettes);
+        self.media.push(self.problems.take(medium)?);
+        let id = MediumId(self.media.len() as u32 - 1);
+        self.known_media.insert(properties.node_id(), id);
+        Some(id)
+    }
+
+    /// The media on both sides of a shape's surface, if it has any.
+    fn boundary(&mut self, shape: &Properties<'_>) -> Option<Boundary> {
+        let mut sides = [INTERIOR, EXTERIOR].map(|name| {
+            let medium = self.problems.take(shape.object(name)).flatten()?;
+            (medium.kind() == Kind::Medium).then_some(medium)
+        });
+        let [interior, exterior] = &mut sides;
+        if interior.is_none() && exterior.is_none() {
+            return None;
+        }
+        Some(Boundary {
+            interior: interior.take().and_then(|medium| self.medium(&medium)),
+            exterior: exterior.take().and_then(|medium| self.medium(&medium)),
+        })
     }
 
     /// Adds a light, which stands on a shape or on none, and says where it is if it is somewhere.
@@ -162,7 +196,13 @@ impl<C: ColorModel> Builder<'_, C> {
                 emitter.is_some(),
             )),
         };
-        Some(Surfacing { material, light })
+        let shape = self.problems.take(shape::declared(properties))?;
+        let boundary = self.boundary(&shape);
+        Some(Surfacing {
+            material,
+            light,
+            boundary,
+        })
     }
 }
 
@@ -253,6 +293,8 @@ pub fn build<C: ColorModel>(
         weights: Vec::new(),
         worn: HashSet::new(),
         ambients: Vec::new(),
+        media: Vec::new(),
+        known_media: HashMap::new(),
         problems: Problems::default(),
     };
     let root = description.root();
@@ -290,6 +332,11 @@ pub fn build<C: ColorModel>(
         }
         environment = Some((id, emitter));
     }
+    for sensor in root.children(Kind::Sensor) {
+        for medium in sensor.children(Kind::Medium) {
+            builder.medium(&medium);
+        }
+    }
     builder.problems.finish()?;
     let warnings = builder.palettes.warnings();
     let Builder {
@@ -297,8 +344,11 @@ pub fn build<C: ColorModel>(
         lights,
         weights,
         ambients,
+        media,
+        known_media,
         ..
     } = builder;
+    let has_passages = materials.iter().any(|material| material.passes());
     let tracer = Tracer::new(
         assets.shapes.iter().map(|s| s.geometry.clone()).collect(),
         &assets.shapes.iter().map(|s| s.group).collect::<Vec<_>>(),
@@ -314,7 +364,10 @@ pub fn build<C: ColorModel>(
         choice,
         ambients,
         environment: environment.map(|(id, _)| id),
+        media,
+        known_media,
         surfacing,
+        has_passages,
         warnings,
     })
 }

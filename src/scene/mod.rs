@@ -7,15 +7,19 @@ mod choice;
 mod displacement;
 mod files;
 
+use std::collections::HashMap;
+
 use glam::Vec3;
 
 use crate::accel::{Counts, Order, Tracer};
 use crate::color::{ColorModel, Spectral};
+use crate::description::NodeId;
 use crate::error::Problem;
 use crate::interaction::{Hit, Interaction, Points, Ray};
 use crate::lanes::{self, Ints as _, Kernel, Lanes, Mask as _};
 use crate::light::{Light, LightSamples};
 use crate::material::Material;
+use crate::medium::Medium;
 
 use choice::Choice;
 
@@ -44,11 +48,42 @@ impl LightId {
     }
 }
 
+/// A medium's place in its scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct MediumId(u32);
+
+impl MediumId {
+    /// The medium's place among the scene's.
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+/// What lies on both sides of a surface where media meet: a medium, or nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Boundary {
+    /// On the side of the geometric normal.
+    pub exterior: Option<MediumId>,
+    /// On the other.
+    pub interior: Option<MediumId>,
+}
+
+impl Boundary {
+    /// What lies in a direction from a point with that geometric normal.
+    pub fn beyond(&self, normal: Vec3, direction: Vec3) -> Option<MediumId> {
+        match normal.dot(direction) > 0.0 {
+            true => self.exterior,
+            false => self.interior,
+        }
+    }
+}
+
 /// What a shape is made of.
 #[derive(Clone, Copy, Debug)]
 struct Surfacing {
     material: MaterialId,
     light: Option<LightId>,
+    boundary: Option<Boundary>,
 }
 
 /// A scene whose colours are in the stored form of `C`.
@@ -62,8 +97,13 @@ pub struct Scene<C: ColorModel> {
     /// Never chosen, for they are nowhere.
     ambients: Vec<Light<C>>,
     environment: Option<LightId>,
+    media: Vec<Medium<C>>,
+    /// The media by the nodes that describe them.
+    known_media: HashMap<NodeId, MediumId>,
     /// By shape.
     surfacing: Vec<Surfacing>,
+    /// Whether any shape's material lets light pass.
+    has_passages: bool,
     warnings: Vec<Problem>,
 }
 
@@ -151,6 +191,36 @@ impl<C: ColorModel> Scene<C> {
     /// The material with that index.
     pub fn material_at(&self, index: usize) -> &Material<C> {
         &self.materials[index]
+    }
+
+    /// Whether light may go straight on through the surface that was hit as if nothing were there.
+    pub fn passes(&self, hit: &Hit) -> bool {
+        self.has_passages && self.materials[self.material_of(hit).index()].passes()
+    }
+
+    /// Whether there is any such surface.
+    pub fn has_passages(&self) -> bool {
+        self.has_passages
+    }
+
+    /// The media on both sides of the surface that was hit, if it parts media.
+    pub fn boundary(&self, hit: &Hit) -> Option<&Boundary> {
+        self.surfacing[hit.shape as usize].boundary.as_ref()
+    }
+
+    /// The medium with that index.
+    pub fn medium_at(&self, index: usize) -> &Medium<C> {
+        &self.media[index]
+    }
+
+    /// How many media there are.
+    pub fn medium_count(&self) -> usize {
+        self.media.len()
+    }
+
+    /// The medium that a node describes, if the scene has it.
+    pub fn medium_of(&self, node: NodeId) -> Option<MediumId> {
+        self.known_media.get(&node).copied()
     }
 
     /// How many materials there are.

@@ -105,7 +105,7 @@ const MOUNT: &[Row] = &[
     float("shutter_close", 0.0, "when it ends").absent("shutter_open"),
     nested(Kind::Film, "size, pixel format and filter"),
     nested(Kind::Sampler, "where samples lie, and how many"),
-    nested(Kind::Medium, "what the sensor stands in: ignored").without_effect(),
+    nested(Kind::Medium, "what the sensor stands in"),
 ];
 
 impl Mount {

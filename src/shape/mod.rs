@@ -27,14 +27,14 @@ use std::path::{Path, PathBuf};
 use glam::{DAffine3, DMat3, DMat4, DVec3, Vec2, Vec3};
 
 use crate::description::declared::{
-    Plugin, Plugins, Row, boolean, file, float, motion, nested, number, string, transform,
+    Plugin, Plugins, Row, boolean, file, float, medium, motion, nested, number, string, transform,
 };
 use crate::description::{Kind, Properties};
 use crate::error::{Problem, Result};
 use crate::family;
 use crate::interaction::{Hit, Interaction, Ray, offset};
 use crate::lanes::{self, Lanes, Mask as _};
-use crate::math::{Moving, Transform};
+use crate::math::Moving;
 use crate::mesh::{Loaded, Mesh, MeshFile, ReadOptions, Time, read};
 use deforming::Sets;
 
@@ -46,96 +46,7 @@ pub use plane::Plane;
 pub use sphere::Sphere;
 pub use tessellate::Untessellated;
 
-/// An axis-aligned box.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Bounds {
-    /// Smallest coordinates.
-    pub min: Vec3,
-    /// Largest coordinates.
-    pub max: Vec3,
-}
-
-impl Bounds {
-    /// Contains nothing.
-    pub const EMPTY: Self = Self {
-        min: Vec3::INFINITY,
-        max: Vec3::NEG_INFINITY,
-    };
-
-    /// Contains every point.
-    pub const EVERYTHING: Self = Self {
-        min: Vec3::NEG_INFINITY,
-        max: Vec3::INFINITY,
-    };
-
-    /// The smallest box around both.
-    #[must_use]
-    #[inline]
-    pub fn union(self, other: Self) -> Self {
-        Self {
-            min: self.min.min(other.min),
-            max: self.max.max(other.max),
-        }
-    }
-
-    /// The smallest box around this and `point`.
-    #[must_use]
-    #[inline]
-    pub fn with(self, point: Vec3) -> Self {
-        Self {
-            min: self.min.min(point),
-            max: self.max.max(point),
-        }
-    }
-
-    /// A box around the box's image, with room for rounding: each product of the matrix is least or greatest at one
-    /// of two planes (Arvo, "Transforming axis-aligned bounding boxes", *Graphics Gems*, 1990).
-    #[must_use]
-    pub fn transformed(self, transform: &Transform) -> Self {
-        if self.is_empty() {
-            return self;
-        }
-        let linear = transform.linear();
-        let (mut min, mut max) = (Vec3::ZERO, Vec3::ZERO);
-        for axis in 0..3 {
-            let column = linear.col(axis);
-            let (low, high) = (column * self.min[axis], column * self.max[axis]);
-            min += low.min(high);
-            max += low.max(high);
-        }
-        let farthest = self.min.abs().max(self.max.abs());
-        let error = transform.point_error(farthest, Vec3::ZERO);
-        let origin = transform.translation();
-        Self {
-            min: min + origin - error,
-            max: max + origin + error,
-        }
-    }
-
-    /// A box around the box's images at all times of an interval (first, last), with room for rounding.
-    #[must_use]
-    pub fn moved(self, moving: &Moving, interval: (f32, f32)) -> Self {
-        match moving {
-            Moving::Still(transform) => self.transformed(transform),
-            _ if self.is_empty() => self,
-            Moving::Keyed(_) => {
-                let [min, max] = moving.swept([self.min, self.max], interval);
-                Self { min, max }
-            }
-        }
-    }
-
-    /// Whether it contains nothing.
-    pub fn is_empty(&self) -> bool {
-        !self.min.cmple(self.max).all()
-    }
-
-    /// Whether it contains something and has no end.
-    pub fn is_unbounded(&self) -> bool {
-        let has_end = self.min.is_finite() && self.max.is_finite();
-        !(has_end || self.is_empty())
-    }
-}
+pub use crate::math::Bounds;
 
 /// A point drawn on a surface as seen from another point.
 #[derive(Clone, Copy, Debug)]
@@ -370,7 +281,9 @@ const COMMON: &[Row] = &[
     TO_WORLD,
     BSDF,
     nested(Kind::Emitter, "area, where it gives light"),
-    nested(Kind::Medium, "what it encloses: ignored, with a warning").without_effect(),
+    medium("interior", "what it encloses"),
+    medium("exterior", "what is around it"),
+    nested(Kind::Medium, "one that is called neither is ignored").without_effect(),
     float(
         "silhouette_sampling_weight",
         1.0,

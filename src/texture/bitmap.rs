@@ -25,7 +25,7 @@ pub(super) struct Texels<C: ColorModel> {
 }
 
 #[derive(Clone, Copy, Debug)]
-enum Wrap {
+pub(super) enum Wrap {
     Repeat,
     Mirror,
     Clamp,
@@ -43,7 +43,7 @@ fn modulo<F: Lanes>(i: F, n: F) -> F {
 impl Wrap {
     /// The texel that stands for the whole number `i` of `n`, wherever it lies.
     #[inline(always)]
-    fn apply<F: Lanes>(self, i: F, n: usize) -> F::Int {
+    pub(super) fn apply<F: Lanes>(self, i: F, n: usize) -> F::Int {
         let (size, last) = (F::splat(n as f32), (n - 1) as f32);
         let wrapped = match self {
             Self::Repeat => modulo(i, size),

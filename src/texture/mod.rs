@@ -15,6 +15,7 @@ mod regular;
 mod sellmeier;
 mod srgb;
 mod uniform;
+pub mod volume;
 mod zoneplate;
 
 use std::collections::HashMap;

@@ -16,8 +16,8 @@ const LAYERS: &[&[&str]] = &[
     &[
         "compare", "display", "filter", "relight", "sampler", "shape", "texture",
     ],
-    &["sensor"],
-    &["accel", "light", "material"],
+    &["phase", "sensor"],
+    &["accel", "light", "material", "medium"],
     &["scene"],
     &["integrator"],
     &["film"],

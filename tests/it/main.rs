@@ -19,6 +19,7 @@ mod instances;
 mod known_radiance;
 mod layers;
 mod lights;
+mod media;
 mod memory;
 mod mesh;
 mod mitsuba_data;
