@@ -172,11 +172,23 @@ fn the_work_on_a_tree_follows_the_rays() {
 
 #[test]
 fn surfaces_with_equations_are_found_alike_in_the_world_and_in_instances() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("curves.txt");
+    let point = |i: u32| {
+        let at = Vec3::new(i as f32 * 0.2 - 1.0, uniform(5, i), uniform(6, i)) - Vec3::splat(0.3);
+        format!("{} {} {} {}\n", at.x, at.y, at.z, 0.1 * uniform(7, i))
+    };
+    std::fs::write(&file, (0..12).map(point).collect::<String>()).unwrap();
+    let curves = ["bsplinecurve", "linearcurve"].map(|plugin| {
+        let file = file.display();
+        format!(r#"<shape type="{plugin}"><string name="filename" value="{file}"/></shape>"#)
+    });
     let text = r#"<scene version="3.0.0"><shape type="sphere"><float name="radius" value="0.7"/></shape>
         <shape type="disk"/><shape type="cylinder"><float name="radius" value="0.4"/></shape>
         <shape type="plane"><transform name="to_world"><rotate x="1" angle="20"/><translate z="-0.9"/></transform>
-        </shape></scene>"#;
-    let scene = Description::parse(text, Path::new("test.xml"), &Options::default()).unwrap();
+        </shape>"#;
+    let text = [text, &curves.concat(), "</scene>"].concat();
+    let scene = Description::parse(&text, Path::new("test.xml"), &Options::default()).unwrap();
     let build = |p: &Properties<'_>| Arc::new(shape::build(p).unwrap().geometry);
     let shapes: Vec<_> = scene
         .root()
@@ -188,7 +200,7 @@ fn surfaces_with_equations_are_found_alike_in_the_world_and_in_instances() {
     let transform = DMat4::from_rotation_x(1.0) * DMat4::from_scale(DVec3::new(1.0, -0.5, 2.0));
     let to_world = Moving::Still(Transform::new(&transform).unwrap());
     let instances = [Instance { to_world, group: 1 }];
-    let tracers = all(&twice, &[0, 0, 0, 0, 1, 1, 1, 1], &instances);
+    let tracers = all(&twice, &[0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1], &instances);
     let rays = rays(20_000, &[Vec3::ZERO, Vec3::X, Vec3::new(0.0, 0.4, 0.5)]);
     assert!(agree(&tracers, &rays) > 10_000);
     for tracer in &tracers {

@@ -202,6 +202,16 @@ impl<'a> Plan<'a> {
             }
             shape::INSTANCE => self.instance(&properties, space),
             shape::NODE => self.node(&properties, space),
+            shape::MERGE => {
+                let inner = Space {
+                    top: false,
+                    ..space.clone()
+                };
+                for child in properties.children(Kind::Shape) {
+                    self.place(child, &inner)?;
+                }
+                Ok(())
+            }
             _ => {
                 if space.shapegroup.is_some() {
                     for emitter in properties.children(Kind::Emitter) {

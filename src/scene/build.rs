@@ -163,15 +163,16 @@ impl<C: ColorModel> Builder<'_, C> {
                 None
             }
             Some(emitter) if geometry.area().is_infinite() => {
-                let error = Error::input(format!(
-                    "a {} has no end, and cannot be a light",
-                    properties.plugin()
-                ));
-                self.problems.push(
-                    error
-                        .at(emitter.location())
-                        .help("let a large rectangle emit"),
-                );
+                let plugin = properties.plugin();
+                let error = match **geometry {
+                    Geometry::Plane(_) => {
+                        Error::input(format!("a {plugin} has no end, and cannot be a light"))
+                            .help("let a large rectangle emit")
+                    }
+                    _ => Error::input(format!("a {plugin} cannot be a light"))
+                        .help("let a mesh emit"),
+                };
+                self.problems.push(error.at(emitter.location()));
                 None
             }
             Some(emitter) if matches!(**geometry, Geometry::Deforming(_)) => {
@@ -257,7 +258,7 @@ impl LightNames {
         for light in shape.children(Kind::Emitter) {
             self.add(light.id().or(shape.id()));
         }
-        if shape.plugin() == shape::NODE {
+        if [shape::NODE, shape::MERGE].contains(&shape.plugin()) {
             for child in shape.children(Kind::Shape) {
                 self.visited += 1;
                 if self.visited > MAX_SHAPES {

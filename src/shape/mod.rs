@@ -1,8 +1,10 @@
 //! Shapes: what a scene's `<shape>` plugins build. Most build a triangle mesh, some a surface with an
 //! equation of its own; everything above sees a [`Geometry`].
 
+mod curves;
 mod deforming;
 mod disk;
+mod ellipsoids;
 mod frustum;
 mod mesh;
 mod plane;
@@ -10,14 +12,17 @@ mod quad;
 mod sphere;
 mod tessellate;
 
+mod bsplinecurve;
 mod cone;
 mod cube;
 mod cylinder;
 mod gltf;
+mod linearcurve;
 mod obj;
 mod ply;
 mod polygon;
 mod rectangle;
+mod sdfgrid;
 mod serialized;
 mod stl;
 mod triangle;
@@ -38,11 +43,15 @@ use crate::math::Moving;
 use crate::mesh::{Loaded, Mesh, MeshFile, ReadOptions, Time, read};
 use deforming::Sets;
 
+pub use bsplinecurve::BsplineCurves;
 pub use deforming::{DeformingMesh, Moment};
 pub use disk::Disk;
+pub use ellipsoids::Ellipsoids;
 pub use frustum::Frustum;
+pub use linearcurve::LinearCurves;
 pub use mesh::{TriangleMesh, Triangles};
 pub use plane::Plane;
+pub use sdfgrid::SdfGrid;
 pub use sphere::Sphere;
 pub use tessellate::Untessellated;
 
@@ -106,7 +115,7 @@ pub trait Surface: std::fmt::Debug + Send + Sync {
     fn intersect(&self, primitive: u32, ray: &Ray) -> Option<(f32, f32, f32)>;
     /// What a hit looks like; `hit` came from this surface and `ray`.
     fn interaction(&self, ray: &Ray, hit: &Hit) -> Interaction<'_>;
-    /// In square units of the scene; may be infinite.
+    /// In square units of the scene; infinite where no light may come from it.
     fn area(&self) -> f64;
     /// A point drawn on the surface for light at `from`; `None` where none can be.
     fn sample(&self, from: Vec3, u: Vec2) -> Option<SurfaceSample>;
@@ -136,8 +145,16 @@ pub enum Geometry {
     Deforming(DeformingMesh),
     /// A disk.
     Disk(Disk),
+    /// Ellipsoids, or hulls around them.
+    Ellipsoids(Ellipsoids),
+    /// B-splines as tubes.
+    Bsplines(BsplineCurves),
+    /// Lines as tubes.
+    Lines(LinearCurves),
     /// A cylinder or a cone.
     Frustum(Frustum),
+    /// A surface in a grid.
+    Sdf(SdfGrid),
     /// A plane without an end.
     Plane(Plane),
     /// A sphere.
@@ -198,8 +215,12 @@ impl std::ops::Deref for Geometry {
             Self::Mesh(mesh) => mesh,
             Self::Deforming(mesh) => mesh,
             Self::Disk(disk) => disk,
+            Self::Ellipsoids(ellipsoids) => ellipsoids,
+            Self::Bsplines(curves) => curves,
+            Self::Lines(curves) => curves,
             Self::Frustum(frustum) => frustum,
             Self::Plane(plane) => plane,
+            Self::Sdf(grid) => grid,
             Self::Sphere(sphere) => sphere,
         }
     }
@@ -236,11 +257,31 @@ enum Build {
 
 /// The shape plugins that are shapes by themselves.
 const SINGLE: &[(&str, &Plugin, Build)] = &[
+    (
+        "bsplinecurve",
+        &bsplinecurve::PLUGIN,
+        Build::Made(bsplinecurve::build),
+    ),
     ("cone", &cone::PLUGIN, Build::Made(cone::build)),
     ("cube", &cube::PLUGIN, Build::Made(cube::build)),
     ("cylinder", &cylinder::PLUGIN, Build::Made(cylinder::build)),
     ("disk", &disk::PLUGIN, Build::Made(disk::build)),
+    (
+        "ellipsoids",
+        &ellipsoids::PLUGIN,
+        Build::Made(ellipsoids::build),
+    ),
+    (
+        "ellipsoidsmesh",
+        &ellipsoids::MESH_PLUGIN,
+        Build::Made(ellipsoids::build_mesh),
+    ),
     ("gltf", &gltf::PLUGIN, Build::Read(gltf::options)),
+    (
+        "linearcurve",
+        &linearcurve::PLUGIN,
+        Build::Made(linearcurve::build),
+    ),
     ("obj", &obj::PLUGIN, Build::Read(obj::options)),
     ("plane", &plane::PLUGIN, Build::Made(plane::build)),
     ("ply", &ply::PLUGIN, Build::Read(ply::options)),
@@ -250,6 +291,7 @@ const SINGLE: &[(&str, &Plugin, Build)] = &[
         &rectangle::PLUGIN,
         Build::Made(rectangle::build),
     ),
+    ("sdfgrid", &sdfgrid::PLUGIN, Build::Made(sdfgrid::build)),
     (
         "serialized",
         &serialized::PLUGIN,
@@ -348,6 +390,8 @@ pub const GROUP: &str = "shapegroup";
 pub const INSTANCE: &str = "instance";
 /// A node of a scene graph: shapes that share its transform and its material.
 pub const NODE: &str = "group";
+/// Shapes that stand where they would by themselves.
+pub const MERGE: &str = "merge";
 
 const COMPOUND: Plugins = &[
     (
@@ -379,6 +423,16 @@ const COMPOUND: Plugins = &[
                 TO_WORLD,
                 nested(Kind::Shape, "shapes, instances and groups"),
                 nested(Kind::Bsdf, "of those shapes that have none of their own"),
+            ]],
+        },
+    ),
+    (
+        MERGE,
+        &Plugin {
+            about: "shapes as they are by themselves: here one tree holds all anyway",
+            properties: &[&[
+                nested(Kind::Shape, "the shapes"),
+                nested(Kind::Bsdf, "shapes have their own").without_effect(),
             ]],
         },
     ),
@@ -561,5 +615,11 @@ fn area_to_solid_angles<F: Lanes>(
     squared / (cosine * F::splat(area as f32))
 }
 
+#[cfg(test)]
+mod curve_tests;
+#[cfg(test)]
+mod ellipsoid_tests;
+#[cfg(test)]
+mod sdf_tests;
 #[cfg(test)]
 mod tests;
