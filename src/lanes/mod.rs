@@ -28,7 +28,9 @@ use std::fmt::Debug;
 use std::ops::{Add, BitAnd, BitOr, BitXor, Div, Index, IndexMut, Mul, Neg, Not, Sub};
 
 pub use divisor::Divisor;
-pub use elementary::{acos, atan2, erf, erf_inverse, exp, ln, pow, sin_cos, sin_cos_turns};
+pub use elementary::{
+    acos, atan2, erf, erf_inverse, exp, ln, ln_bessel_i0, pow, sin_cos, sin_cos_turns,
+};
 pub use frame::Frame;
 pub use kernel::{Kernel, Set};
 pub use long::Long;

@@ -65,6 +65,23 @@ fn angles_are_those_of_the_quadrants() {
     assert_eq!(acos::<f32>(2.0), 0.0);
 }
 
+/// I₀ by its series, in double precision, where that does not overflow.
+#[test]
+fn the_logarithm_of_the_bessel_function_is_that_of_its_series() {
+    for i in 0..3000 {
+        let x = (i as f32 * 0.2).min(600.0);
+        let quarter = f64::from(x) * f64::from(x) / 4.0;
+        let (mut term, mut sum) = (1.0, 1.0);
+        for k in 1..2000 {
+            term *= quarter / f64::from(k * k);
+            sum += term;
+        }
+        let error = f64::from(ln_bessel_i0(x)) - f64::ln(sum);
+        assert!(error.abs() < 1e-6 + 2e-7 * f64::from(x), "{x}: {error}");
+    }
+    assert_eq!(ln_bessel_i0(0.0_f32), 0.0);
+}
+
 #[test]
 fn erf_is_the_integral_of_the_bell_curve() {
     let (mut sum, step) = (0.0f64, 1e-4);
@@ -161,6 +178,7 @@ impl Task for Everything<'_> {
                 atan2(a, b),
                 acos(a),
                 erf(a),
+                ln_bessel_i0(a.abs()),
                 erf_inverse(a),
                 local.x,
                 local.y,

@@ -7,6 +7,7 @@ mod bumpmap;
 mod conductor;
 mod dielectric;
 mod diffuse;
+mod hair;
 mod mask;
 mod normalmap;
 mod null;
@@ -150,6 +151,7 @@ family! {
         "conductor" => Conductor(conductor::Conductor<C>),
         "dielectric" => Dielectric(dielectric::Dielectric<C>),
         "diffuse" => Diffuse(diffuse::Diffuse<C>),
+        "hair" => Hair(hair::Hair<C>),
         "mask" => Mask(mask::Mask<C>),
         "normalmap" => NormalMap(normalmap::NormalMap<C>),
         "null" => Null(null::Null),

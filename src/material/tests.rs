@@ -35,6 +35,11 @@ const MATERIALS: &[(&str, &str)] = &[
         "diffuse",
         r#"<bsdf type="diffuse"><rgb name="reflectance" value="1, 0.5, 0"/></bsdf>"#,
     ),
+    ("hair", r#"<bsdf type="hair"/>"#),
+    (
+        "hair",
+        r#"<bsdf type="hair"><rgb name="sigma_a" value="0, 0.2, 1"/><float name="scale" value="0.5"/><float name="longitudinal_roughness" value="0.15"/><float name="azimuthal_roughness" value="0.8"/><float name="scale_tilt" value="5"/></bsdf>"#,
+    ),
     (
         "mask",
         r#"<bsdf type="mask"><float name="opacity" value="0.7"/><bsdf type="diffuse"><float name="reflectance" value="1"/></bsdf></bsdf>"#,
@@ -275,8 +280,9 @@ fn every_material_draws_directions_with_the_density_that_it_says() {
 
 #[test]
 fn reflection_is_reciprocal() {
-    // A turned normal is not the surface's, and its cosine not the one that light is counted by.
-    let turned = |name: &str| ["bumpmap", "normalmap"].contains(&name);
+    // A turned normal is not the surface's, and its cosine not the one that light is counted by. What a fibre absorbs is
+    // told by one of the two directions.
+    let turned = |name: &str| ["bumpmap", "normalmap", "hair"].contains(&name);
     for (name, text) in MATERIALS.iter().filter(|(name, _)| !turned(name)) {
         let material = build(text);
         for i in 0..2000 {
@@ -308,6 +314,48 @@ const OUTWARD: Pair = [[0.1, 0.3, -0.9], [-0.05, -0.3, 0.8]];
 
 /// Values and densities of Mitsuba 3.9.1, `scalar_rgb`.
 const MITSUBA: &[(&str, Pair, [f32; 3], f32)] = &[
+    (
+        r#"<bsdf type="hair"></bsdf>"#,
+        REFLECTED,
+        [0.142266, 0.142257, 0.142256],
+        0.660124,
+    ),
+    (
+        r#"<bsdf type="hair"></bsdf>"#,
+        INWARD,
+        [1.10204, 0.495899, 0.0680408],
+        2.92065,
+    ),
+    (
+        r#"<bsdf type="hair"></bsdf>"#,
+        [[-0.1, 0.7, 0.4], [0.3, -0.6, -0.8]],
+        [0.00153125, 0.000575631, 5.1763e-05],
+        0.0037185,
+    ),
+    (
+        r#"<bsdf type="hair"><float name="eumelanin" value="0.2"/><float name="pheomelanin" value="0.4"/><float name="longitudinal_roughness" value="0.1"/><float name="azimuthal_roughness" value="0.6"/><float name="scale_tilt" value="5"/></bsdf>"#,
+        INWARD,
+        [1.45302, 1.09993, 0.5042],
+        1.95517,
+    ),
+    (
+        r#"<bsdf type="hair"><float name="eumelanin" value="0.2"/><float name="pheomelanin" value="0.4"/><float name="longitudinal_roughness" value="0.1"/><float name="azimuthal_roughness" value="0.6"/><float name="scale_tilt" value="5"/></bsdf>"#,
+        [[0.9, 0.05, 0.2], [-0.9, 0.1, -0.3]],
+        [0.653982, 0.650217, 0.647156],
+        0.936422,
+    ),
+    (
+        r#"<bsdf type="hair"><rgb name="sigma_a" value="0.1, 0.3, 1.5"/><float name="scale" value="0.5"/><float name="int_ior" value="1.4"/><float name="longitudinal_roughness" value="0.8"/></bsdf>"#,
+        REFLECTED,
+        [0.0328588, 0.0328359, 0.0328069],
+        0.0435666,
+    ),
+    (
+        r#"<bsdf type="hair"><rgb name="sigma_a" value="0.1, 0.3, 1.5"/><float name="scale" value="0.5"/><float name="int_ior" value="1.4"/><float name="longitudinal_roughness" value="0.8"/></bsdf>"#,
+        [[-0.1, 0.7, 0.4], [0.3, -0.6, -0.8]],
+        [0.218715, 0.169864, 0.0373734],
+        0.244561,
+    ),
     (
         r#"<bsdf type="plastic"><boolean name="nonlinear" value="true"/><rgb name="specular_reflectance" value=".5,1,.2"/></bsdf>"#,
         REFLECTED,
@@ -423,7 +471,9 @@ fn values_and_densities_are_those_of_mitsuba() {
     for (text, pair, value, pdf) in MITSUBA {
         let [wi, wo] = pair.map(|d| Vec3::from_array(d).normalize());
         let ours = build(text).eval(&interaction(), wi, wo, &()).unwrap();
-        let near = |a: f32, b: f32| (a - b).abs() <= 5e-4 * b.abs() + 1e-7;
+        // Mitsuba's Bessel function is up to 0.5 % too small where its argument is just above 12.
+        let tolerance = if text.contains("hair") { 5e-3 } else { 5e-4 };
+        let near = |a: f32, b: f32| (a - b).abs() <= tolerance * b.abs() + 1e-7;
         assert!(near(ours.pdf, *pdf), "{text}: {} {pdf}", ours.pdf);
         for c in 0..3 {
             assert!(near(ours.value[c], value[c]), "{text}: {ours:?} {value:?}");
