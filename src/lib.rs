@@ -37,6 +37,8 @@ pub mod medium;
 
 pub mod scene;
 
+pub mod raster;
+
 pub mod integrator;
 
 pub(crate) mod film;

@@ -109,6 +109,11 @@ impl Shapes {
         &self.shapes[shape as usize]
     }
 
+    /// All of them, to be held by somebody else as well.
+    pub(super) fn shared(&self) -> Vec<Arc<Geometry>> {
+        self.shapes.clone()
+    }
+
     pub(super) fn iter(&self) -> impl Iterator<Item = &Geometry> {
         self.shapes.iter().map(|shape| &**shape)
     }

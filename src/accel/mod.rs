@@ -167,10 +167,23 @@ pub struct Instance {
     pub group: u32,
 }
 
+/// A shape where it stands in the world.
+#[derive(Clone, Copy, Debug)]
+pub struct Standing<'a> {
+    /// Its index.
+    pub shape: u32,
+    /// The instance through which it stands there, or [`Hit::NONE`].
+    pub instance: u32,
+    /// From its space to the world, where that is another.
+    pub to_world: Option<&'a Moving>,
+}
+
 /// The shapes of a scene, ready to be met by rays.
 #[derive(Debug)]
 pub struct Tracer {
     shapes: Shapes,
+    /// By shape.
+    group_of: Vec<u32>,
     instances: Vec<Instance>,
     /// Each instance's box in the world, for all times of rays.
     instance_bounds: Vec<Bounds>,
@@ -230,6 +243,7 @@ impl Tracer {
         let inner = groups[1..].iter().map(Group::levels);
         Self {
             shapes,
+            group_of: group_of.to_vec(),
             instances,
             instance_bounds,
             inner_levels: inner.max().unwrap_or(0),
@@ -319,6 +333,41 @@ impl Tracer {
     /// How many instances there are.
     pub fn instance_count(&self) -> usize {
         self.instances.len()
+    }
+
+    /// A shape by its index, in its group's space.
+    pub fn shape(&self, index: u32) -> &Geometry {
+        self.shapes.get(index)
+    }
+
+    /// Every shape wherever it stands in the world, in the order of hits.
+    pub fn standing(&self) -> impl Iterator<Item = Standing<'_>> {
+        let of = move |group: u32| {
+            let shapes = (0..).zip(&self.group_of);
+            shapes.filter_map(move |(shape, own)| (*own == group).then_some(shape))
+        };
+        let once_more = (0..)
+            .zip(&self.instances)
+            .flat_map(move |(index, instance)| {
+                of(instance.group).map(move |shape| Standing {
+                    shape,
+                    instance: index,
+                    to_world: Some(&instance.to_world),
+                })
+            });
+        once_more.chain(of(0).map(|shape| Standing {
+            shape,
+            instance: Hit::NONE,
+            to_world: None,
+        }))
+    }
+
+    /// The same shapes, met in another way.
+    #[must_use]
+    pub fn rebuilt(&self, recipe: impl Into<Recipe>) -> Self {
+        let shapes = self.shapes.shared();
+        let tracer = Self::new(shapes, &self.group_of, self.instances.clone(), recipe);
+        tracer.with_kernel(self.kernel)
     }
 
     /// What the folder of trees was good for, if there was one.

@@ -4,11 +4,12 @@ use std::num::NonZeroUsize;
 use std::path::{Component, PathBuf};
 use std::time::Duration;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use etendue::crosscheck::{self, Python, Settings, Side, Watch};
 use etendue::error::{Error, Result};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
+use super::oracle::Subject;
 use super::overrides::ImageArguments;
 use super::progress::StepLines;
 use super::scene::ReadArguments;
@@ -16,7 +17,7 @@ use super::stop::Stop;
 use super::verdicts::{self, Ending, Style};
 use super::{output, page, parse, report, status};
 
-/// Render scenes here and in Mitsuba, and say whether the images agree
+/// Hold scenes against what Mitsuba renders, or rays against the z-buffer, and say whether they agree
 ///
 /// Each side renders each scene with several seeds. How much the seeds of a side differ is the yardstick:
 /// the images differ where the means over the seeds, of the whole, of tiles or of pixels, are further apart
@@ -28,6 +29,10 @@ use super::{output, page, parse, report, status};
 ///
 /// Mitsuba is driven through Python: that of --python, else of $ETENDUE_PYTHON, else of the environment that
 /// --install makes. A scene that asks for what one side lacks is told as not comparable.
+///
+/// With --against raster no image is rendered and nothing else is needed: what rays see at pixel centres is held
+/// against what this program's z-buffer sees there, away from silhouettes: depth, position, normals, texture
+/// coordinates, shapes and triangles.
 #[derive(Args, Debug)]
 #[command(after_help = HELP)]
 pub(super) struct Arguments {
@@ -38,6 +43,9 @@ pub(super) struct Arguments {
     read: ReadArguments,
     #[command(flatten)]
     image: ImageArguments,
+    /// What scenes are held against
+    #[arg(long, value_enum, default_value_t = Against::Mitsuba, value_name = "WHAT")]
+    against: Against,
     /// Let Mitsuba render this scene instead: the same in words that Mitsuba knows
     #[arg(long, value_name = "SCENE")]
     reference: Option<PathBuf>,
@@ -92,6 +100,15 @@ pub(super) struct Arguments {
     quiet: bool,
 }
 
+/// What scenes are held against.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Against {
+    /// What Mitsuba renders
+    Mitsuba,
+    /// What the z-buffer sees
+    Raster,
+}
+
 const HELP: &str = "\
 Examples:
   etendue crosscheck --install
@@ -99,6 +116,7 @@ Examples:
   etendue crosscheck scene.xml --seeds 16 --precision 0.002 --keep out
   etendue crosscheck scenes/*.xml --report out && xdg-open out/index.html
   etendue crosscheck scene.xml --variant llvm_ad_rgb --timing-only --json
+  etendue crosscheck scenes/*.xml --against raster
 
 Exit status: 0 done; all scenes agree; 1 one differs; 2 none differs and one could not be compared or was \
 too noisy to say, Mitsuba is not there, or the command line is wrong; 3 the system refused; 130 stopped by \
@@ -170,6 +188,17 @@ impl Arguments {
 
 /// Runs the command; the answer is the exit status.
 pub(super) fn run(arguments: &Arguments) -> Result<u8> {
+    if arguments.against == Against::Raster {
+        let subject = Subject {
+            scenes: &arguments.scenes,
+            read: &arguments.read,
+            image: &arguments.image,
+            threads: arguments.threads,
+            json: arguments.json,
+            quiet: arguments.quiet,
+        };
+        return subject.run();
+    }
     let folders = folders(&arguments.scenes);
     let mut settings = match arguments.settings() {
         Ok(settings) => settings,

@@ -25,6 +25,7 @@ mod display;
 mod growth;
 mod images;
 mod memory;
+mod oracle;
 mod output;
 mod overrides;
 mod page;

@@ -108,6 +108,10 @@ pub(super) struct Arguments {
     /// Write the image as it stands every so many seconds; the signal SIGUSR1 asks for it too
     #[arg(long, value_name = "SECONDS", value_parser = parse::seconds, help_heading = RUN)]
     snapshot: Option<Duration>,
+    /// First write a picture by the z-buffer, within moments and before there is a tree: with direct light alone, shadows
+    /// by maps and nothing blurred. The image as asked for takes its place when it is done
+    #[arg(long, help_heading = RUN)]
+    preview: bool,
     #[command(flatten)]
     run: RunArguments,
     /// How rays find shapes; the image is the same
@@ -154,6 +158,7 @@ Examples:
   etendue render walk.xml -o out/{frame:04}.exr --frames 0:240 -D body=body-{frame:04}.ply
   etendue render room.xml -o room.exr --noise-threshold 0.01 --sampler sobol
   etendue render big.xml -o big.exr --checkpoint 300 --resume
+  etendue render big.xml -o big.png --preview
   etendue render terrain.ply -o terrain.png --cache ~/.cache/etendue
   etendue render dragon.ply -o dragon.png --stats --heatmap steps.png
   etendue render room.xml -o room.png --exposure auto --view agx
@@ -213,6 +218,7 @@ impl Arguments {
             sensor: item.sensor,
             pinned: false,
             recorded: self.skip_same,
+            preview: self.preview,
             checkpoint: (self.checkpoint.is_some() || self.resume).then_some(checkpoint),
         }
     }
@@ -229,6 +235,7 @@ impl Arguments {
             (self.resume, "--resume"),
             (self.heatmap.is_some(), "--heatmap"),
             (self.snapshot.is_some(), "--snapshot"),
+            (self.preview, "--preview"),
         ];
         let is_part = is_part(Path::new(&self.output));
         match of_whole.into_iter().find(|(given, _)| *given) {

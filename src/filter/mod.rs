@@ -38,6 +38,11 @@ impl Default for Filter {
 }
 
 impl Filter {
+    /// Weight 1 on the pixel alone.
+    pub fn pixel() -> Self {
+        Self::Box(r#box::Box)
+    }
+
     /// The weights at distances of |x| pixels; zero beyond the radius.
     #[inline(always)]
     pub fn weight<F: Lanes>(&self, x: F) -> F {

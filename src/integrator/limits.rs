@@ -41,6 +41,9 @@ pub(super) const COMMON: &[Row] = &[HIDE_EMITTERS, BLOCK_SIZE, SAMPLES_PER_PASS,
 /// How long paths may become.
 pub(super) const LIMITS: &[Row] = &[MAX_DEPTH, RR_DEPTH];
 
+/// The same of those that follow no paths.
+pub(super) const NO_DEPTHS: &[Row] = &[MAX_DEPTH.without_effect(), RR_DEPTH.without_effect()];
+
 /// What integrators accept that do not ask for light themselves.
 pub(super) const UNUSED: &[Row] = &[
     HIDE_EMITTERS.without_effect(),

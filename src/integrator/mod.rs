@@ -12,6 +12,7 @@ mod direct;
 mod moment;
 mod path;
 mod phong;
+mod raster;
 mod volpath;
 mod volpathmis;
 
@@ -35,6 +36,7 @@ use crate::scene::Scene;
 pub use cost::{Cost, Stats};
 pub use footprint::Footprint;
 pub use limits::timeout_note;
+pub(crate) use raster::Raster;
 
 /// A camera sample.
 #[derive(Clone, Copy, Debug)]
@@ -119,6 +121,7 @@ family! {
         "moment" => Moment(moment::Moment<C>),
         "path" => Path(path::Path),
         "phong" => Phong(phong::Phong),
+        "raster" => Raster(raster::Raster),
         "volpath" => VolPath(volpath::VolPath),
         "volpathmis" => VolPathMis(volpathmis::VolPathMis),
     }

@@ -79,6 +79,8 @@ pub struct Options {
     pub sensor: usize,
     /// Whether it is told what the image was made of.
     pub recorded: bool,
+    /// Whether a picture by the z-buffer comes first, before there is a tree.
+    pub preview: bool,
     /// Where the render is kept, so that it can be continued after an interruption.
     pub checkpoint: Option<Checkpoint>,
 }

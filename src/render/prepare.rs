@@ -17,6 +17,7 @@ use super::origin::{Origin, Outcome};
 use super::plan::Completed;
 use super::plugins;
 use super::progress::{Phase, Picture, Progress};
+use super::rastered;
 use super::{Report, Seconds, timed};
 use crate::accel::{Build, CacheUse, Method, Recipe};
 use crate::color::ColorModel;
@@ -304,6 +305,28 @@ impl<'a> Ask<'a> {
         }
     }
 
+    /// Whether a picture is to be shown before there is a tree.
+    fn previews(&self) -> bool {
+        self.options.preview && self.traced
+    }
+
+    /// Shows a picture by the z-buffer.
+    fn preview<C: ColorModel>(&self, scene: &Scene<C>, view: &View<C>) -> Result<()> {
+        let Some(image) = rastered::preview(scene, view, self.progress)? else {
+            return Ok(()); // stopped
+        };
+        let origin = Origin {
+            integrator: rastered::NAME.to_owned(),
+            ..view.origin(&self.options.scene, self.options.seed, scene.color())
+        };
+        self.progress.picture(&Picture {
+            image,
+            window: view.window(),
+            metadata: origin.metadata(&rastered::preview_outcome()),
+        });
+        Ok(())
+    }
+
     /// How rays find shapes, if there are any.
     fn method(&self) -> Method {
         match self.traced {
@@ -326,11 +349,14 @@ fn make<C: ColorModel>(
     ask: &Ask<'_>,
     given: Option<ReadMesh>,
     color: C,
-    Share {
-        film,
-        rays,
-        shutter,
-    }: Share,
+    (
+        view,
+        Share {
+            film,
+            rays,
+            shutter,
+        },
+    ): (Option<&View<C>>, Share),
 ) -> Result<(Scene<C>, Facts, Seconds)> {
     let Ask {
         description,
@@ -386,7 +412,16 @@ fn make<C: ColorModel>(
             cache: options.cache.clone(),
             shutter,
         };
-        scene::build(description, &assets, color, recipe)
+        let Some(view) = view.filter(|_| ask.previews()) else {
+            return scene::build(description, &assets, color, recipe);
+        };
+        let treeless = Recipe {
+            method: Method::Brute,
+            ..recipe.clone()
+        };
+        let scene = scene::build(description, &assets, color, treeless)?;
+        ask.preview(&scene, view)?;
+        Ok(scene.rebuilt(recipe))
     })?;
     progress.advance(1, 0);
     let cache = scene.tracer().cache_use().clone();
@@ -440,11 +475,12 @@ pub(super) fn prepare<'k, C: ColorModel>(ask: &'k mut Ask<'_>, color: C) -> Resu
             .then(|| [share.shutter.0, share.shutter.1].map(f32::to_bits)),
     };
     let fresh = |kept: &Kept| kept.key == key && kept.stamps == kept.facts.stamps();
-    if !ask.shelf.kept.as_ref().is_some_and(fresh) {
+    let is_kept = ask.shelf.kept.as_ref().is_some_and(fresh);
+    if !is_kept {
         ask.shelf.kept = None;
         let others = sensor.map(|sensor| others::<C>(description, sensor));
         let others = others.and_then(|others| problems.take(others));
-        let made = problems.take(make(ask, given, color, share));
+        let made = problems.take(make(ask, given, color, (view.as_ref(), share)));
         ask.shelf.kept = made.map(|(scene, mut facts, spent)| {
             facts.warnings.extend(others.unwrap_or_default());
             Kept {
@@ -474,6 +510,9 @@ pub(super) fn prepare<'k, C: ColorModel>(ask: &'k mut Ask<'_>, color: C) -> Resu
         .scene
         .downcast_ref()
         .expect("equal colours have equal types");
+    if is_kept && ask.previews() {
+        ask.preview(scene, &view)?;
+    }
     let mut warnings = description.warnings().to_vec();
     warnings.extend(findings.notes);
     warnings.extend(facts.warnings.iter().cloned());
@@ -538,18 +577,7 @@ impl<C: ColorModel> Job<'_, C> {
 
     /// The crop's place on the film.
     pub(super) fn window(&self) -> Window {
-        let Film {
-            width,
-            height,
-            crop,
-            ..
-        } = &self.view.film;
-        Window {
-            x: crop.x,
-            y: crop.y,
-            full_width: *width,
-            full_height: *height,
-        }
+        self.view.window()
     }
 
     /// The report, but for what rendering counted.
@@ -585,16 +613,39 @@ impl<C: ColorModel> Job<'_, C> {
 
     /// What the image is of.
     pub(super) fn origin(&self, scene: &str) -> Origin {
-        let View { sensor, .. } = &self.view;
+        self.view.origin(scene, self.seed, self.scene.color())
+    }
+}
+
+impl<C: ColorModel> View<C> {
+    /// The crop's place on the film.
+    fn window(&self) -> Window {
+        let Film {
+            width,
+            height,
+            crop,
+            ..
+        } = &self.film;
+        Window {
+            x: crop.x,
+            y: crop.y,
+            full_width: *width,
+            full_height: *height,
+        }
+    }
+
+    /// What the image is of.
+    fn origin(&self, scene: &str, seed: u64, color: &C) -> Origin {
+        let Self { sensor, .. } = self;
         let to_camera = sensor.world_to_camera(sensor.shutter().0);
         Origin {
             scene: scene.to_owned(),
-            integrator: self.view.integrator_name.clone(),
-            seed: self.seed,
+            integrator: self.integrator_name.clone(),
+            seed,
             machine: machine(),
             world_to_camera: to_camera.to_cols_array(),
             world_to_ndc: (sensor.projection() * to_camera).to_cols_array(),
-            spectral: (self.scene.color().channels().iter()).any(|name| name.starts_with("S0.")),
+            spectral: (color.channels().iter()).any(|name| name.starts_with("S0.")),
         }
     }
 }

@@ -22,14 +22,15 @@ use super::prepare::{self, Ask, Facts, Job, Shelf, View};
 use super::progress::Progress;
 use super::provenance::{self, Provenance};
 use super::uniform;
-use super::{Parted, Rendered, Report, timed};
+use super::{Parted, Rendered, Report, rastered, timed};
 #[cfg(feature = "bands")]
 use crate::color::{Bands, MAX_BANDS};
 use crate::color::{ColorModel, Comb, Response, Rgb};
 use crate::description::Description;
-use crate::error::{Error, Result};
+use crate::error::{Error, Problem, Result};
 use crate::film::{Accumulator, Tally};
 use crate::image::Image;
+use crate::integrator::{Integrator, Raster};
 use crate::mesh::ReadMesh;
 use crate::sensor::Film;
 use crate::shape::Bounds;
@@ -110,6 +111,8 @@ impl Task for Render<'_> {
     fn run<C: ColorModel>(mut self, color: C) -> Result<Rendered> {
         let (description, options) = (self.0.description, self.0.options);
         let progress = self.0.progress;
+        // What the z-buffer draws needs no tree.
+        self.0.traced = !rastered::draws(description, options);
         let job = prepare::prepare(&mut self.0, color)?;
         let mut keeper = match &options.checkpoint {
             Some(checkpoint) => {
@@ -124,7 +127,11 @@ impl Task for Render<'_> {
             completed,
             tally,
             adaptive,
+            notes,
         } = timed(&mut seconds.render, || match &options.adaptive {
+            None if let Integrator::Raster(raster) = &job.view.integrator => {
+                Finished::rastered(&job, raster, progress)
+            }
             None => Finished::uniform(&job, options, progress, keeper.as_mut()),
             Some(adaptive) => {
                 Finished::adaptive(&job, (options, adaptive), progress, keeper.as_mut())
@@ -140,7 +147,11 @@ impl Task for Render<'_> {
             report.spp = adaptive.mean_spp.round() as u32;
             report.adaptive = Some(adaptive);
         }
+        if let (Integrator::Raster(raster), None) = (&job.view.integrator, &options.adaptive) {
+            report.spp = raster.pattern.count() as u32;
+        }
         tell(&mut report, &tally, &job.view.film);
+        warnings.extend(notes);
         warnings.extend(tally.warning());
         if completed.units[0] > 0 {
             warnings.extend(black::black(&job, description, &image));
@@ -260,6 +271,8 @@ struct Finished {
     completed: Completed,
     tally: Tally,
     adaptive: Option<AdaptiveReport>,
+    /// What the user should know of the image.
+    notes: Vec<Problem>,
 }
 
 impl Finished {
@@ -280,6 +293,22 @@ impl Finished {
             completed,
             tally,
             adaptive: None,
+            notes: Vec::new(),
+        })
+    }
+
+    fn rastered<C: ColorModel>(
+        job: &Job<'_, C>,
+        raster: &Raster,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        let drawn = rastered::draw(job.scene, &job.view, raster, progress)?;
+        Ok(Self {
+            image: drawn.sums.develop(&job.view.film)?,
+            completed: drawn.completed,
+            tally: drawn.sums.tally,
+            adaptive: None,
+            notes: drawn.notes,
         })
     }
 
@@ -306,6 +335,7 @@ impl Finished {
                 adaptive::Given::new(&job.view.film, ladder.limits(), blocks)
                     .report(options.1.noise_threshold, ladder.limits()),
             ),
+            notes: Vec::new(),
         })
     }
 }

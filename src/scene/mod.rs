@@ -11,7 +11,7 @@ use std::collections::HashMap;
 
 use glam::Vec3;
 
-use crate::accel::{Counts, Order, Tracer};
+use crate::accel::{Counts, Order, Recipe, Tracer};
 use crate::color::{ColorModel, Spectral};
 use crate::description::NodeId;
 use crate::error::Problem;
@@ -132,6 +132,15 @@ impl<C: ColorModel> Scene<C> {
         }
     }
 
+    /// The same, whose shapes are met in another way; what is seen is the same to the bit.
+    #[must_use]
+    pub fn rebuilt(self, recipe: impl Into<Recipe>) -> Self {
+        Self {
+            tracer: self.tracer.rebuilt(recipe),
+            ..self
+        }
+    }
+
     /// How many lights there are.
     pub fn light_count(&self) -> usize {
         self.lights.len() + self.ambients.len()
@@ -140,6 +149,11 @@ impl<C: ColorModel> Scene<C> {
     /// The lights that are somewhere, as [`light_names`] names them.
     pub fn lights(&self) -> &[Light<C>] {
         &self.lights
+    }
+
+    /// The names of [`Scene::lights`] in their order.
+    pub fn light_ids(&self) -> impl Iterator<Item = LightId> + use<C> {
+        (0..self.lights.len() as u32).map(LightId)
     }
 
     /// The light all around, if there is one.
@@ -186,6 +200,16 @@ impl<C: ColorModel> Scene<C> {
     /// The material of the surface that was hit.
     pub fn material_of(&self, hit: &Hit) -> MaterialId {
         self.surfacing[hit.shape as usize].material
+    }
+
+    /// What a shape is made of.
+    pub fn made_of(&self, shape: u32) -> MaterialId {
+        self.surfacing[shape as usize].material
+    }
+
+    /// Whether a shape is a light.
+    pub fn shines(&self, shape: u32) -> bool {
+        self.surfacing[shape as usize].light.is_some()
     }
 
     /// The material with that index.

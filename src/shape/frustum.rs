@@ -284,9 +284,19 @@ impl Surface for Frustum {
 
     /// By the side's texture coordinates; none where there are ends as well.
     fn chart(&self, parameters: Vec2) -> Option<Chart> {
+        (self.ends.is_empty())
+            .then(|| self.patch(0, parameters))
+            .flatten()
+    }
+
+    /// By texture coordinates, of the side and of the ends.
+    fn patch(&self, primitive: u32, parameters: Vec2) -> Option<Chart> {
+        if let Some(end) = primitive.checked_sub(1) {
+            return self.ends.get(end as usize)?.chart(parameters);
+        }
         let (around, point) = self.at(parameters);
         let stretch = TAU * self.radius(parameters.y.into()) * self.stretch(around);
-        self.ends.is_empty().then_some(Chart { point, stretch })
+        Some(Chart { point, stretch })
     }
 
     fn pdf(&self, from: Vec3, at: &Interaction<'_>) -> f32 {

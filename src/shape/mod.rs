@@ -128,6 +128,12 @@ pub trait Surface: std::fmt::Debug + Send + Sync {
     fn chart(&self, _parameters: Vec2) -> Option<Chart> {
         None
     }
+    /// The place with these parameters on one of the primitives, each of which is covered by one square of them.
+    fn patch(&self, primitive: u32, parameters: Vec2) -> Option<Chart> {
+        (primitive == 0 && self.primitive_count() == 1)
+            .then(|| self.chart(parameters))
+            .flatten()
+    }
     /// The parameters of a place, if there is a [`Surface::chart`].
     fn parameters(&self, _primitive: u32, _barycentric: Vec2, uv: Vec2) -> Vec2 {
         uv

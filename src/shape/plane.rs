@@ -43,6 +43,18 @@ pub(super) fn build(properties: &Properties<'_>, outer: &DMat4) -> Result<Shape>
 }
 
 impl Plane {
+    /// The normal, and the corners of a square of the plane around the foot of a point; its sides are twice `half`.
+    pub(crate) fn square(&self, around: Vec3, half: f64) -> (Vec3, [Vec3; 4]) {
+        let normal = self.normal.as_dvec3();
+        let origin = self.to_world.translation;
+        let around = around.as_dvec3();
+        let foot = around - (around - origin).dot(normal) * normal;
+        let (s, t) = normal.any_orthonormal_pair();
+        let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
+        let corner = |(x, y): (f64, f64)| (foot + half * (x * s + y * t)).as_vec3();
+        (self.normal, corners.map(corner))
+    }
+
     /// The distance along the ray, in double precision.
     fn distance(&self, ray: &Ray) -> f64 {
         let o = self.to_local.transform_point3(ray.origin.as_dvec3());
@@ -96,8 +108,9 @@ impl Surface for Plane {
         f64::INFINITY
     }
 
-    fn uv(&self, _point: &SurfaceSample) -> Vec2 {
-        unreachable!("no point of a plane is drawn")
+    fn uv(&self, point: &SurfaceSample) -> Vec2 {
+        let p = self.to_local.transform_point3(point.position.as_dvec3());
+        (0.5 * (p.truncate() + 1.0)).as_vec2()
     }
 
     fn sample(&self, _from: Vec3, _u: Vec2) -> Option<SurfaceSample> {

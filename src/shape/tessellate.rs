@@ -4,7 +4,7 @@
 
 use glam::{Vec2, Vec3};
 
-use super::{Geometry, Surface, SurfaceSample};
+use super::{Chart, Geometry, SurfaceSample};
 use crate::mesh::{Mesh, TooMany};
 
 /// Why a surface was not made into triangles.
@@ -35,8 +35,22 @@ impl Geometry {
                 mesh.tessellate(longest, most)?;
                 Ok(mesh)
             }
-            other => grid(&*other, longest, most),
+            other => grid(&|at| other.chart(at), longest, most),
         }
+    }
+
+    /// One of the primitives of a surface that is no mesh as triangles, as [`Geometry::into_triangles`] makes them; texture
+    /// coordinates are the parameters of the [`Surface::patch`].
+    ///
+    /// # Errors
+    /// Where it cannot be, or there would be more than `most`.
+    pub fn patch_triangles(
+        &self,
+        primitive: u32,
+        longest: f32,
+        most: usize,
+    ) -> Result<Mesh, Untessellated> {
+        grid(&|at| self.patch(primitive, at), longest, most)
     }
 }
 
@@ -44,8 +58,12 @@ impl Geometry {
 const LINES: u32 = 16;
 const STEPS: u32 = 64;
 
-fn grid(surface: &dyn Surface, longest: f32, most: usize) -> Result<Mesh, Untessellated> {
-    let at = |u: f32, v: f32| surface.chart(Vec2::new(u, v)).map(|chart| chart.point);
+fn grid(
+    chart: &dyn Fn(Vec2) -> Option<Chart>,
+    longest: f32,
+    most: usize,
+) -> Result<Mesh, Untessellated> {
+    let at = |u: f32, v: f32| chart(Vec2::new(u, v)).map(|chart| chart.point);
     if at(0.5, 0.5).is_none() {
         return Err(Untessellated::NoChart);
     }

@@ -19,6 +19,7 @@ const LAYERS: &[&[&str]] = &[
     &["phase", "sensor"],
     &["accel", "light", "material", "medium"],
     &["scene"],
+    &["raster"],
     &["integrator"],
     &["film"],
     &["render"],

@@ -28,6 +28,7 @@ mod opacity;
 mod parts;
 mod phong;
 mod profile;
+mod raster;
 mod resume;
 mod same_bits;
 mod signs;

@@ -1,0 +1,318 @@
+//! What is drawn: the shapes of a scene as triangles, each wherever it stands in the world at one time, numbered through in the
+//! order of hits: by instance, shape and primitive. Meshes are drawn as they are. What has an equation is cut into triangles
+//! whose chords leave it by less than an eighth of a pixel, as far as there are not too many; where in a pixel's ray it is
+//! then exactly is found by `fragment`. A plane without an end is a square that reaches beyond all that can be seen.
+
+use std::borrow::Cow;
+use std::collections::HashMap;
+
+use glam::{DMat3, DVec3, Vec2, Vec3};
+
+use super::projection::Projection;
+use crate::accel::{Standing, Tracer};
+use crate::error::{Error, Problem, Result};
+use crate::math::Transform;
+use crate::mesh::Mesh;
+use crate::shape::{Bounds, Geometry, Untessellated};
+
+/// Triangles of a shape, in its own space.
+#[derive(Debug)]
+pub(super) struct Facets<'s> {
+    /// The shape.
+    pub(super) geometry: &'s Geometry,
+    pub(super) positions: Cow<'s, [Vec3]>,
+    pub(super) triangles: Cow<'s, [[u32; 3]]>,
+    pub(super) kind: FacetsOf<'s>,
+}
+
+/// Of what they are.
+#[derive(Debug)]
+pub(super) enum FacetsOf<'s> {
+    /// A mesh that keeps its shape: a triangle is a primitive.
+    Mesh(&'s Mesh),
+    /// A mesh that deforms, as it is at the time.
+    Deforming,
+    /// A surface with patches: the parameters of the corners, and of each primitive the first triangle.
+    Patches {
+        parameters: Vec<Vec2>,
+        starts: Vec<usize>,
+    },
+    /// A plane, with its normal.
+    Plane(Vec3),
+}
+
+/// A shape where it stands.
+#[derive(Debug)]
+pub(super) struct Placed {
+    pub(super) shape: u32,
+    pub(super) instance: u32,
+    /// From its space to the world; `None` where that is the same.
+    pub(super) to_world: Option<Transform>,
+    /// The number of its first triangle.
+    pub(super) first: u32,
+}
+
+impl Placed {
+    /// To the world, in double precision.
+    pub(super) fn matrix(&self) -> (DMat3, DVec3) {
+        match &self.to_world {
+            None => (DMat3::IDENTITY, DVec3::ZERO),
+            Some(to_world) => (
+                to_world.linear().as_dmat3(),
+                to_world.translation().as_dvec3(),
+            ),
+        }
+    }
+}
+
+/// What could not be, with the reason.
+type Fallible<T> = std::result::Result<T, Untessellated>;
+
+/// The triangles of a scene at one time.
+#[derive(Debug)]
+pub struct Drawn<'s> {
+    facets: HashMap<u32, Facets<'s>>,
+    placed: Vec<Placed>,
+    warnings: Vec<Problem>,
+}
+
+/// The most triangles that one primitive becomes.
+const MOST: usize = 1 << 19;
+
+impl<'s> Drawn<'s> {
+    /// The shapes of the tracer for which `wanted` holds, as they stand at `time`, fine enough for the projection.
+    ///
+    /// # Errors
+    /// Where there are more triangles than 32 bits count.
+    pub fn new(
+        tracer: &'s Tracer,
+        projection: &Projection,
+        time: f32,
+        wanted: impl Fn(u32) -> bool,
+    ) -> Result<Self> {
+        let mut facets: HashMap<u32, Facets<'s>> = HashMap::new();
+        let mut missing: Vec<(u32, Untessellated)> = Vec::new();
+        // Where the same shape stands several times it is cut as finely as the nearest needs.
+        let mut longest: HashMap<u32, f32> = HashMap::new();
+        for Standing {
+            shape, to_world, ..
+        } in tracer.standing().filter(|s| wanted(s.shape))
+        {
+            let geometry = tracer.shape(shape);
+            if geometry.mesh().is_some() {
+                continue;
+            }
+            let to_world = to_world.map(|moving| moving.at(time));
+            let edge = edge(geometry, to_world.as_ref(), projection);
+            let known = longest.entry(shape).or_insert(edge);
+            *known = known.min(edge);
+        }
+        let mut placed = Vec::new();
+        let mut next = 0_u64;
+        for standing in tracer.standing().filter(|s| wanted(s.shape)) {
+            let shape = standing.shape;
+            if missing.iter().any(|(other, _)| *other == shape) {
+                continue;
+            }
+            if let std::collections::hash_map::Entry::Vacant(vacant) = facets.entry(shape) {
+                let edge = longest.get(&shape).copied();
+                match Facets::of(tracer.shape(shape), edge, projection, time) {
+                    Ok(of_shape) => {
+                        vacant.insert(of_shape);
+                    }
+                    Err(why) => {
+                        missing.push((shape, why));
+                        continue;
+                    }
+                }
+            }
+            placed.push(Placed {
+                shape,
+                instance: standing.instance,
+                to_world: standing.to_world.map(|moving| moving.at(time)),
+                first: next as u32,
+            });
+            next += facets[&shape].triangles.len() as u64;
+            if next >= u64::from(u32::MAX) {
+                let message =
+                    "there are more than 2³² triangles to be drawn, each instance's counted";
+                return Err(Error::unsupported(message));
+            }
+        }
+        let warnings = missing.iter().map(|(shape, why)| unseen(*shape, *why));
+        Ok(Self {
+            facets,
+            placed,
+            warnings: warnings.collect(),
+        })
+    }
+
+    /// What cannot be drawn.
+    pub fn warnings(&self) -> &[Problem] {
+        &self.warnings
+    }
+
+    pub(super) fn placed(&self) -> &[Placed] {
+        &self.placed
+    }
+
+    pub(super) fn facets(&self, placed: &Placed) -> &Facets<'s> {
+        &self.facets[&placed.shape]
+    }
+
+    /// Where a triangle with that number stands, and which of the shape's it is.
+    pub(super) fn find(&self, number: u32) -> (&Placed, usize) {
+        let after = self.placed.partition_point(|placed| placed.first <= number);
+        // Shapes without triangles begin where the next does, and are passed over.
+        let placed = &self.placed[after - 1];
+        (placed, (number - placed.first) as usize)
+    }
+
+    /// How many triangles there are.
+    pub fn triangle_count(&self) -> usize {
+        let count = |placed| self.facets(placed).triangles.len();
+        self.placed.iter().map(count).sum()
+    }
+}
+
+fn unseen(shape: u32, why: Untessellated) -> Problem {
+    let why = match why {
+        Untessellated::NoChart => "it has no triangles and no parameters",
+        Untessellated::TooMany => "it would take too many triangles",
+    };
+    let message = format!("shape {} of the scene is not drawn: {why}", shape + 1);
+    let error = Error::unsupported(message).help("rays see it");
+    error.problems()[0].clone()
+}
+
+/// A box around all of a shape's primitives.
+fn bounds(geometry: &Geometry) -> Bounds {
+    let primitives = 0..geometry.primitive_count();
+    primitives.fold(Bounds::EMPTY, |bounds, primitive| {
+        bounds.union(geometry.bounds(primitive))
+    })
+}
+
+/// How long edges of its triangles may be, in its own space.
+fn edge(geometry: &Geometry, to_world: Option<&Transform>, projection: &Projection) -> f32 {
+    let own = bounds(geometry);
+    let diagonal = (own.max - own.min).length();
+    if !diagonal.is_finite() || own.is_empty() {
+        return f32::INFINITY;
+    }
+    let inner = match to_world {
+        Some(to_world) => own.transformed(to_world),
+        None => own,
+    };
+    let in_world = (inner.max - inner.min).length();
+    let corner = |i: u32| {
+        let pick = |axis: u32| {
+            if i >> axis & 1 == 1 {
+                inner.max
+            } else {
+                inner.min
+            }
+        };
+        DVec3::new(pick(0).x.into(), pick(1).y.into(), pick(2).z.into())
+    };
+    let [near, _] = projection.range();
+    let nearest = (0..8).map(|i| projection.place(corner(i)).a);
+    let nearest = nearest.fold(f64::INFINITY, f64::min).max(near);
+    // A chord of length h leaves a circle of radius r by h²/8r. A long thing is bent around its second side.
+    let sides = (own.max - own.min).to_array();
+    let [small, large] = [f32::min, f32::max].map(|pick| pick(pick(sides[0], sides[1]), sides[2]));
+    let radius = 0.5 * (sides.iter().sum::<f32>() - small - large).max(diagonal / 512.0);
+    let scale = f64::from(diagonal / in_world);
+    let longest = (f64::from(radius) * projection.pixel(nearest) * scale).sqrt();
+    (longest as f32).clamp(radius / 128.0, radius / 4.0)
+}
+
+/// A primitive as triangles, as fine as their number allows.
+fn patch(geometry: &Geometry, primitive: u32, longest: f32) -> Fallible<Mesh> {
+    const COARSER: i32 = 12;
+    let mut tried = (0..COARSER).map(|step| {
+        let longest = longest * 1.5_f32.powi(step);
+        geometry.patch_triangles(primitive, longest, MOST)
+    });
+    let is_final = |result: &Fallible<Mesh>| !matches!(result, Err(Untessellated::TooMany));
+    tried.find(is_final).unwrap_or(Err(Untessellated::TooMany))
+}
+
+impl<'s> Facets<'s> {
+    fn of(
+        geometry: &'s Geometry,
+        longest: Option<f32>,
+        projection: &Projection,
+        time: f32,
+    ) -> Fallible<Self> {
+        let (positions, triangles, kind) = match geometry {
+            Geometry::Mesh(mesh) => {
+                let mesh = mesh.mesh();
+                (
+                    Cow::Borrowed(&*mesh.positions),
+                    Cow::Borrowed(&*mesh.triangles),
+                    FacetsOf::Mesh(mesh),
+                )
+            }
+            Geometry::Deforming(deforming) => {
+                let triangles = &*deforming.mesh().triangles;
+                let mut positions = deforming.mesh().positions.clone();
+                for (number, corners) in (0..).zip(triangles) {
+                    let places = deforming.corners(number, deforming.moment(time));
+                    for (corner, place) in corners.iter().zip(places) {
+                        positions[*corner as usize] = place;
+                    }
+                }
+                (
+                    Cow::Owned(positions),
+                    Cow::Borrowed(triangles),
+                    FacetsOf::Deforming,
+                )
+            }
+            Geometry::Plane(plane) => {
+                let half = 4.0 * projection.range()[1] * projection.reach();
+                let (normal, corners) = plane.square(projection.origin(), half);
+                (
+                    Cow::Owned(corners.to_vec()),
+                    Cow::Owned(vec![[0, 1, 2], [0, 2, 3]]),
+                    FacetsOf::Plane(normal),
+                )
+            }
+            other => {
+                let longest = longest.unwrap_or(f32::INFINITY);
+                let (mut positions, mut triangles) = (Vec::new(), Vec::new());
+                let (mut parameters, mut starts) = (Vec::new(), Vec::new());
+                for primitive in 0..other.primitive_count() {
+                    let patch = patch(other, primitive, longest)?;
+                    let first = positions.len() as u32;
+                    starts.push(triangles.len());
+                    triangles.extend(patch.triangles.iter().map(|t| t.map(|i| first + i)));
+                    positions.extend(patch.positions);
+                    parameters.extend(patch.uvs);
+                }
+                (
+                    Cow::Owned(positions),
+                    Cow::Owned(triangles),
+                    FacetsOf::Patches { parameters, starts },
+                )
+            }
+        };
+        Ok(Self {
+            geometry,
+            positions,
+            triangles,
+            kind,
+        })
+    }
+
+    /// The shape's primitive that a triangle belongs to.
+    pub(super) fn primitive(&self, triangle: usize) -> u32 {
+        match &self.kind {
+            FacetsOf::Mesh(_) | FacetsOf::Deforming => triangle as u32,
+            FacetsOf::Patches { starts, .. } => {
+                starts.partition_point(|start| *start <= triangle) as u32 - 1
+            }
+            FacetsOf::Plane(_) => 0,
+        }
+    }
+}

@@ -1,0 +1,293 @@
+//! What is seen at a place of the picture, exactly: where the ray through it meets the plane of the triangle that the z-buffer
+//! found, by homogeneous coordinates (Olano and Greer, *Triangle scan conversion using 2D homogeneous coordinates*, 1997), in
+//! double precision and without the grid's rounding. So interpolation is right in perspective, and no triangle has to be cut
+//! for it. On a surface with an equation the ray goes on to where the surface's own parameters put it, by Newton's method from
+//! the triangle's point.
+//!
+//! Nothing here asks how rays find shapes: the quantities are the triangles' and the charts' own, for `agreement` to hold
+//! against the rays'.
+
+use glam::{DMat3, DVec2, DVec3, Vec2, Vec3};
+
+use super::drawn::{Drawn, Facets, FacetsOf, Placed};
+use super::projection::{Line, Place, Projection};
+use crate::interaction::{Hit, Ray};
+use crate::shape::SurfaceSample;
+
+/// A point of a surface that is seen.
+#[derive(Clone, Copy, Debug)]
+pub struct Fragment {
+    /// The same as a ray through the place would say it, but for `t`, which is 0.
+    pub hit: Hit,
+    /// How far along the projection's line.
+    pub a: f64,
+    /// World space.
+    pub position: DVec3,
+    /// The geometric normal, unit length.
+    pub normal: Vec3,
+    /// The interpolated normal, unit length; `None` for a mesh that deforms.
+    pub shading: Option<Vec3>,
+    /// Texture coordinates.
+    pub uv: Vec2,
+    /// How far the place is from the triangle's nearest edge, in pixels.
+    pub edge: f64,
+    /// The triangle's corners, world space.
+    pub corners: [DVec3; 3],
+    /// The barycentric coordinates of the place on it.
+    pub weights: [f64; 3],
+}
+
+impl Fragment {
+    /// What is seen at a place, in pixels, of the triangle with that number.
+    pub fn new(drawn: &Drawn<'_>, projection: &Projection, number: u32, at: DVec2) -> Self {
+        let (placed, triangle) = drawn.find(number);
+        let facets = drawn.facets(placed);
+        let (linear, translation) = placed.matrix();
+        let corners = facets.triangles[triangle].map(|i| facets.positions[i as usize].as_dvec3());
+        let (matrix, offset) = projection.along_ways(linear, translation);
+        let places = corners.map(|corner| projection.placed(matrix * corner + offset));
+        let weights = weights(&places, at);
+        let local = corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2];
+        let a = places[0].a * weights[0] + places[1].a * weights[1] + places[2].a * weights[2];
+        let seen = Seen {
+            facets,
+            triangle,
+            weights,
+            local,
+            a,
+        };
+        let mut fragment = Self {
+            hit: Hit {
+                t: 0.0,
+                u: weights[1] as f32,
+                v: weights[2] as f32,
+                instance: placed.instance,
+                shape: placed.shape,
+                primitive: facets.primitive(triangle),
+            },
+            a,
+            position: linear * local + translation,
+            normal: Vec3::ZERO,
+            shading: None,
+            uv: Vec2::ZERO,
+            edge: f64::INFINITY,
+            corners: corners.map(|corner| linear * corner + translation),
+            weights,
+        };
+        let line = projection.line(at);
+        let local_normal = match &facets.kind {
+            FacetsOf::Patches { .. } => {
+                let inverse = linear.inverse();
+                let own = Line {
+                    origin: inverse * (line.origin - translation),
+                    way: inverse * line.way,
+                };
+                let point = seen.on_patch(&own);
+                fragment.a = point.a;
+                fragment.position = line.at(point.a);
+                fragment.shading = Some(normal_in_world(placed, point.sample.normal));
+                fragment.uv = facets.geometry.uv(&point.sample);
+                (fragment.hit.u, fragment.hit.v) = (0.0, 0.0);
+                point.sample.normal
+            }
+            kind => {
+                fragment.edge = distance_to_edges(&places, at);
+                let normal = match kind {
+                    FacetsOf::Plane(normal) => *normal,
+                    _ => {
+                        let [a, b, c] = corners;
+                        (b - a).cross(c - a).normalize_or_zero().as_vec3()
+                    }
+                };
+                fragment.uv = facets.geometry.uv(&seen.sample(normal, &fragment.hit));
+                fragment.shading = match kind {
+                    FacetsOf::Mesh(_) => Some(seen.shading(normal)),
+                    FacetsOf::Plane(_) => Some(normal),
+                    _ => None,
+                }
+                .map(|normal| normal_in_world(placed, normal));
+                normal
+            }
+        };
+        fragment.normal = normal_in_world(placed, local_normal);
+        fragment
+    }
+
+    /// The hit of the ray that goes through the place.
+    pub fn hit_of(&self, ray: &Ray) -> Hit {
+        let way = self.position - ray.origin.as_dvec3();
+        Hit {
+            t: way.dot(ray.direction.as_dvec3()) as f32,
+            ..self.hit
+        }
+    }
+}
+
+/// A normal of a shape's space in the world.
+fn normal_in_world(placed: &Placed, normal: Vec3) -> Vec3 {
+    match &placed.to_world {
+        None => normal,
+        Some(to_world) => {
+            let cofactors = to_world.inverse().linear().transpose().as_dmat3();
+            (cofactors * normal.as_dvec3())
+                .normalize_or_zero()
+                .as_vec3()
+        }
+    }
+}
+
+/// The barycentric coordinates of the point of a triangle that is seen at a place: not negative, even where the grid has
+/// given a triangle a place that lies beside it.
+fn weights(places: &[Place; 3], at: DVec2) -> [f64; 3] {
+    let [a, b, c] = places.map(|p| DVec3::new(p.x, p.y, p.w));
+    let way = at.extend(1.0);
+    let weights = [
+        b.cross(c).dot(way),
+        c.cross(a).dot(way),
+        a.cross(b).dot(way),
+    ];
+    let sign = weights.iter().sum::<f64>().signum();
+    let weights = weights.map(|weight| (weight * sign).max(0.0));
+    let sum: f64 = weights.iter().sum();
+    match sum > 0.0 && sum.is_finite() {
+        true => weights.map(|weight| weight / sum),
+        false => [1.0 / 3.0; 3],
+    }
+}
+
+/// How far a place is from the lines of a triangle's edges, in pixels.
+fn distance_to_edges(places: &[Place; 3], at: DVec2) -> f64 {
+    let [a, b, c] = places.map(|p| DVec3::new(p.x, p.y, p.w));
+    let distance = |from: DVec3, to: DVec3| {
+        let line = from.cross(to);
+        line.dot(at.extend(1.0)).abs() / line.truncate().length()
+    };
+    distance(a, b).min(distance(b, c)).min(distance(c, a))
+}
+
+/// A point of a triangle, in the shape's space.
+struct Seen<'a> {
+    facets: &'a Facets<'a>,
+    triangle: usize,
+    weights: [f64; 3],
+    local: DVec3,
+    a: f64,
+}
+
+/// A point of a patch.
+struct OnPatch {
+    sample: SurfaceSample,
+    a: f64,
+}
+
+impl Seen<'_> {
+    /// As shapes know points.
+    fn sample(&self, normal: Vec3, hit: &Hit) -> SurfaceSample {
+        SurfaceSample {
+            position: self.local.as_vec3(),
+            normal,
+            primitive: hit.primitive,
+            barycentric: Vec2::new(hit.u, hit.v),
+            pdf: 0.0,
+        }
+    }
+
+    /// The interpolated normal of a mesh, or the geometric one where it has none.
+    fn shading(&self, geometric: Vec3) -> Vec3 {
+        let FacetsOf::Mesh(mesh) = self.facets.kind else {
+            return geometric;
+        };
+        if mesh.normals.is_empty() {
+            return geometric;
+        }
+        let corners = self.facets.triangles[self.triangle];
+        let [a, b, c] = corners.map(|i| mesh.normals[i as usize].as_dvec3());
+        let [u, v, w] = self.weights;
+        let normal = (a * u + b * v + c * w).normalize_or_zero().as_vec3();
+        if normal == Vec3::ZERO {
+            geometric
+        } else {
+            normal
+        }
+    }
+
+    /// Where the line meets the patch that the triangle stands for: Newton's method for the parameters and `a`. Where that
+    /// does not converge it is the triangle's point, with the patch's normal there.
+    fn on_patch(&self, line: &Line) -> OnPatch {
+        /// Half a step of parameters between places whose difference is a derivative.
+        const STEP: f32 = 1.0 / 512.0;
+        const ROUNDS: u32 = 12;
+        let FacetsOf::Patches { parameters, .. } = &self.facets.kind else {
+            unreachable!("only patches are asked");
+        };
+        let primitive = self.facets.primitive(self.triangle);
+        let corners = self.facets.triangles[self.triangle];
+        let [a, b, c] = corners.map(|i| parameters[i as usize].as_dvec2());
+        let [u, v, w] = self.weights;
+        let start = a * u + b * v + c * w;
+        let at = |parameters: DVec2| {
+            let chart = self.facets.geometry.patch(primitive, parameters.as_vec2());
+            chart.expect("it was cut into triangles").point
+        };
+        let (mut place, mut along) = (start, self.a);
+        let reach = line.way.length();
+        let mut best = (f64::INFINITY, start, self.a);
+        for _ in 0..ROUNDS {
+            let point = at(place).position.as_dvec3();
+            let off = line.at(along) - point;
+            let distance = off.length();
+            if distance < best.0 {
+                best = (distance, place, along);
+            } else if distance.is_nan() || distance > 2.0 * best.0 {
+                break;
+            }
+            let change = |step: Vec2| {
+                let [back, forth] = [-1.0, 1.0].map(|sign| {
+                    let moved = place + (step * sign).as_dvec2();
+                    at(moved).position.as_dvec3()
+                });
+                (forth - back) / f64::from(2.0 * STEP)
+            };
+            let (mut du, mut dv) = (change(Vec2::new(STEP, 0.0)), change(Vec2::new(0.0, STEP)));
+            // At a pole one of them is nothing: a little of anything lets the others be solved for.
+            let least = 1e-6 * du.length().max(dv.length());
+            let normal = at(place).normal.as_dvec3();
+            if du.length() < least {
+                du += least * dv.normalize_or_zero().cross(normal);
+            }
+            if dv.length() < least {
+                dv += least * normal.cross(du.normalize_or_zero());
+            }
+            let step = DMat3::from_cols(du, dv, -line.way).inverse() * off;
+            if !step.is_finite() {
+                break;
+            }
+            place += step
+                .truncate()
+                .clamp(DVec2::splat(-0.05), DVec2::splat(0.05));
+            along += step.z;
+        }
+        let (distance, place, along) = best;
+        // Charts are of single precision. Near a silhouette the other side is a solution too.
+        let [found, begun] = [place, start].map(|place| at(place).normal.as_dvec3().dot(line.way));
+        let near = distance < 1e-5 * (reach * along.abs() + self.local.length());
+        let near = near && (found < 0.0) == (begun < 0.0);
+        let (place, along) = if near {
+            (place, along)
+        } else {
+            (start, self.a)
+        };
+        let sample = at(place);
+        OnPatch {
+            sample: SurfaceSample {
+                position: match near {
+                    true => line.at(along).as_vec3(),
+                    false => sample.position,
+                },
+                primitive,
+                ..sample
+            },
+            a: along,
+        }
+    }
+}

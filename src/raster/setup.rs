@@ -1,0 +1,346 @@
+//! Triangles in the picture: corners on a grid of fixed-point numbers, edge functions in integers, which are exact, and the
+//! top-left rule (Pineda, *A parallel algorithm for polygon rendering*, 1988). So a sample on an edge that two triangles share
+//! belongs to one of them, and a closed surface has neither cracks nor samples that are drawn twice.
+//!
+//! What an edge leaves of a row of samples is computed by one division, so that the samples within need no test.
+
+use super::projection::Place;
+use crate::sensor::Window;
+
+/// Fixed-point coordinates are below 2 to that power, so that edge functions fit into 64 bits.
+const COORDINATE_BITS: u32 = 29;
+
+/// The picture, and the grid that corners are moved to.
+#[derive(Clone, Debug)]
+pub(super) struct Grid {
+    /// The first pixel, across and down.
+    first: [u32; 2],
+    /// How many there are.
+    size: [u32; 2],
+    /// Bits of a coordinate's fraction of a pixel.
+    bits: u32,
+    /// Where samples lie within a pixel.
+    samples: Vec<[i64; 2]>,
+    /// The least and the greatest of those coordinates.
+    inset: [[i64; 2]; 2],
+}
+
+/// A corner.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Corner {
+    /// On the grid; `UNPLACED` where the triangle has to be cut first.
+    pub(super) x: i32,
+    pub(super) y: i32,
+    /// What is linear over the picture.
+    pub(super) linear: f64,
+}
+
+impl Corner {
+    const UNPLACED: i32 = i32::MIN;
+
+    /// One that does not lie within the limits.
+    pub(super) const OUTSIDE: Self = Self {
+        x: Self::UNPLACED,
+        y: 0,
+        linear: 0.0,
+    };
+
+    #[inline]
+    pub(super) fn is_outside(&self) -> bool {
+        self.x == Self::UNPLACED
+    }
+}
+
+impl Grid {
+    /// For a window of a picture of that size. The grid is the picture's, whatever the window.
+    pub(super) fn new(picture: [u32; 2], window: &Window, pattern: &super::Pattern) -> Self {
+        let largest = picture[0].max(picture[1]).max(1);
+        // The band is four times as wide as the picture.
+        let whole = (4 * largest).next_power_of_two().ilog2();
+        let bits = COORDINATE_BITS - whole;
+        let samples = pattern.fixed(bits);
+        let inset = [0, 1].map(|axis| {
+            let along = samples.iter().map(|sample| sample[axis]);
+            [along.clone().min().unwrap_or(0), along.max().unwrap_or(0)]
+        });
+        Self {
+            first: [window.x, window.y],
+            size: [window.width, window.height],
+            bits,
+            samples,
+            inset,
+        }
+    }
+
+    /// How far coordinates may reach, in pixels.
+    pub(super) fn band(&self) -> f64 {
+        f64::from(1_u32 << (COORDINATE_BITS - self.bits))
+    }
+
+    /// How many rows of pixels there are.
+    pub(super) fn rows(&self) -> u32 {
+        self.size[1]
+    }
+
+    /// A place on the grid. It must lie within the band.
+    #[inline]
+    pub(super) fn corner(&self, place: &Place, linear: f64) -> Corner {
+        // What is added and taken away rounds to whole numbers, half to even.
+        const WHOLE: f64 = 1.5 * (1_u64 << 52) as f64;
+        let scale = f64::from(1_u32 << self.bits) / place.w;
+        let [x, y] = [place.x * scale, place.y * scale].map(|v| (v + WHOLE - WHOLE) as i32);
+        let [left, top] = self.first.map(|first| (first << self.bits) as i32);
+        Corner {
+            x: x - left,
+            y: y - top,
+            linear,
+        }
+    }
+
+    /// The pixels along an axis that a range of coordinates may have samples in.
+    #[inline]
+    fn pixels(&self, axis: usize, least: i32, greatest: i32) -> (i64, i64) {
+        let [low, high] = self.inset[axis];
+        let first = (i64::from(least) - high + (1 << self.bits) - 1) >> self.bits;
+        let last = (i64::from(greatest) - low) >> self.bits;
+        (first.max(0), last.min(i64::from(self.size[axis]) - 1))
+    }
+
+    /// The triangle with these corners, unless it has no samples in the picture.
+    #[inline]
+    pub(super) fn triangle(&self, corners: [Corner; 3]) -> Option<Facet> {
+        let [a, b, c] = corners;
+        let (left, right) = self.pixels(0, a.x.min(b.x).min(c.x), a.x.max(b.x).max(c.x));
+        if left > right {
+            return None;
+        }
+        let (top, bottom) = self.pixels(1, a.y.min(b.y).min(c.y), a.y.max(b.y).max(c.y));
+        if top > bottom {
+            return None;
+        }
+        let area = edge(&a, &b, i64::from(c.x), i64::from(c.y));
+        if area == 0 {
+            return None;
+        }
+        Some(Facet {
+            corners: if area > 0 { [a, b, c] } else { [a, c, b] },
+            area: area.abs(),
+            is_turned: area < 0,
+            columns: (left, right),
+            rows: (top, bottom),
+        })
+    }
+}
+
+/// Twice the area of a point and an edge, positive on its right as seen with y down.
+#[inline]
+fn edge(from: &Corner, to: &Corner, x: i64, y: i64) -> i64 {
+    let (dx, dy) = (
+        i64::from(to.x) - i64::from(from.x),
+        i64::from(to.y) - i64::from(from.y),
+    );
+    dx * (y - i64::from(from.y)) - dy * (x - i64::from(from.x))
+}
+
+/// A triangle that may have samples.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Facet {
+    /// Clockwise as seen with y down.
+    corners: [Corner; 3],
+    /// Twice.
+    area: i64,
+    /// Whether that is not the order in which they were given.
+    pub(super) is_turned: bool,
+    /// The first and the last pixel across.
+    columns: (i64, i64),
+    /// And down.
+    rows: (i64, i64),
+}
+
+impl Facet {
+    /// How many rows of pixels it reaches over.
+    pub(super) fn height(&self) -> i64 {
+        self.rows.1 - self.rows.0 + 1
+    }
+
+    /// The rows from the first to before the last that it may have samples in.
+    pub(super) fn reaches(&self, rows: &std::ops::Range<u32>) -> bool {
+        self.rows.0 < i64::from(rows.end) && self.rows.1 >= i64::from(rows.start)
+    }
+
+    /// Gives the samples that it covers in some rows of the picture: index of the pixel and of the sample, and what is linear
+    /// over the picture there.
+    #[inline]
+    pub(super) fn cover(
+        &self,
+        grid: &Grid,
+        rows: std::ops::Range<u32>,
+        mut take: impl FnMut(usize, usize, f64),
+    ) {
+        let [a, b, c] = &self.corners;
+        let edges = [(b, c), (c, a), (a, b)];
+        let top = self.rows.0.max(i64::from(rows.start));
+        let bottom = self.rows.1.min(i64::from(rows.end) - 1);
+        let scale = 1.0 / self.area as f64;
+        let step = 1_i64 << grid.bits;
+        for (sample, [inset_x, inset_y]) in grid.samples.iter().enumerate() {
+            let x = (self.columns.0 << grid.bits) + inset_x;
+            for row in top..=bottom {
+                let y = (row << grid.bits) + inset_y;
+                let mut values = [0; 3];
+                let (mut first, mut last) = (0, self.columns.1 - self.columns.0);
+                let mut across = [0; 3];
+                for (i, (from, to)) in edges.iter().enumerate() {
+                    let dy = i64::from(to.y) - i64::from(from.y);
+                    let value = edge(from, to, x, y);
+                    let along = -dy * step;
+                    (values[i], across[i]) = (value, along);
+                    // A sample on the edge counts where that is a left one or one at the top.
+                    let counts = dy < 0 || (dy == 0 && to.x > from.x);
+                    let inner = value - i64::from(!counts);
+                    if along == 0 {
+                        if inner < 0 {
+                            last = -1;
+                        }
+                    } else if along > 0 {
+                        if inner < 0 {
+                            first = first.max((-inner + along - 1) / along);
+                        }
+                    } else if inner < 0 {
+                        last = -1;
+                    } else {
+                        last = last.min(inner / -along);
+                    }
+                }
+                if first > last {
+                    continue;
+                }
+                let begin = (row * i64::from(grid.size[0]) + self.columns.0) as usize;
+                // Linear: at the first of the samples, and how it changes.
+                let at = |values: [i64; 3]| {
+                    let [u, v, w] = values.map(|value| value as f64 * scale);
+                    u * a.linear + v * b.linear + w * c.linear
+                };
+                let value = |i: usize, column: i64| values[i] + across[i] * column;
+                for column in first..=last {
+                    let linear = at([value(0, column), value(1, column), value(2, column)]);
+                    take(begin + column as usize, sample, linear);
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Pattern;
+    use super::*;
+
+    fn grid(pattern: Pattern) -> Grid {
+        let window = Window {
+            x: 0,
+            y: 0,
+            width: 64,
+            height: 48,
+        };
+        Grid::new([64, 48], &window, &pattern)
+    }
+
+    fn corner(grid: &Grid, x: f64, y: f64) -> Corner {
+        let place = Place {
+            x,
+            y,
+            a: 1.0,
+            w: 1.0,
+        };
+        grid.corner(&place, x + 2.0 * y)
+    }
+
+    /// How often each sample is covered by the triangles.
+    fn counts(grid: &Grid, triangles: &[[[f64; 2]; 3]]) -> Vec<u32> {
+        let samples = grid.samples.len();
+        let mut counts = vec![0; 64 * 48 * samples];
+        for triangle in triangles {
+            let corners = triangle.map(|[x, y]| corner(grid, x, y));
+            if let Some(facet) = grid.triangle(corners) {
+                facet.cover(grid, 0..48, |pixel, sample, _| {
+                    counts[pixel * samples + sample] += 1;
+                });
+            }
+        }
+        counts
+    }
+
+    #[test]
+    fn a_fan_of_slivers_covers_every_sample_once() {
+        for (count, middle) in [
+            (7, [32.0, 24.0]),
+            (1000, [32.5, 24.5]),
+            (4001, [31.3, 20.7]),
+        ] {
+            let rim = |i: u32| {
+                let angle = std::f64::consts::TAU * f64::from(i % count) / f64::from(count);
+                [
+                    middle[0] + 200.0 * angle.cos(),
+                    middle[1] + 200.0 * angle.sin(),
+                ]
+            };
+            let fan: Vec<_> = (0..count).map(|i| [middle, rim(i), rim(i + 1)]).collect();
+            for samples in super::super::pattern::COUNTS {
+                let grid = grid(Pattern::of(samples).unwrap());
+                let counts = counts(&grid, &fan);
+                assert!(counts.iter().all(|n| *n == 1), "{count} {samples}");
+            }
+        }
+    }
+
+    #[test]
+    fn corners_on_pixel_centres_leave_no_crack_and_nothing_twice() {
+        // A mesh of squares, each of two triangles in either order and winding, whose corners are samples.
+        let mut triangles = Vec::new();
+        for y in -1..25 {
+            for x in -1..33 {
+                let at =
+                    |i: i32, j: i32| [f64::from(2 * (x + i)) + 0.5, f64::from(2 * (y + j)) + 0.5];
+                let [a, b, c, d] = [at(0, 0), at(1, 0), at(1, 1), at(0, 1)];
+                triangles.extend(match (x + y) % 3 {
+                    0 => [[a, b, c], [a, c, d]],
+                    1 => [[b, a, d], [d, c, b]],
+                    _ => [[c, b, a], [c, a, d]],
+                });
+            }
+        }
+        let grid = grid(Pattern::CENTRE);
+        assert!(counts(&grid, &triangles).iter().all(|n| *n == 1));
+    }
+
+    #[test]
+    fn what_is_linear_over_the_picture_is_linear_over_the_triangle() {
+        let grid = grid(Pattern::CENTRE);
+        let corners = [[3.2, 4.7], [60.1, 9.9], [20.0, 45.5]].map(|[x, y]| corner(&grid, x, y));
+        let mut covered = 0;
+        grid.triangle(corners)
+            .unwrap()
+            .cover(&grid, 0..48, |pixel, _, linear| {
+                let (x, y) = ((pixel % 64) as f64 + 0.5, (pixel / 64) as f64 + 0.5);
+                assert!((linear - (x + 2.0 * y)).abs() < 1e-3, "{linear}");
+                covered += 1;
+            });
+        let area = 0.5 * ((56.9_f64) * 40.8 - 5.2 * 16.8);
+        assert!((f64::from(covered) - area).abs() < 40.0, "{covered} {area}");
+    }
+
+    #[test]
+    fn a_triangle_without_area_or_without_samples_is_none() {
+        let grid = grid(Pattern::CENTRE);
+        for triangle in [
+            [[3.0, 4.0], [10.0, 11.0], [17.0, 18.0]],
+            [[3.6, 4.6], [3.9, 4.6], [3.7, 4.9]],
+            [[-30.0, 4.0], [-3.0, 4.0], [-3.0, 40.0]],
+            [[30.0, 400.0], [3.0, 444.0], [3.0, 490.0]],
+        ] {
+            let corners = triangle.map(|[x, y]| corner(&grid, x, y));
+            assert!(grid.triangle(corners).is_none(), "{triangle:?}");
+        }
+    }
+}

@@ -1,0 +1,281 @@
+//! Pictures that the z-buffer draws: of the integrator `raster`, and before the image of another. The whole film is drawn at
+//! once, then shaded by bands of rows. A pixel is the mean of its samples, each triangle in it shaded once: the film's filter
+//! and sampler have no part in it.
+
+use glam::{DVec2, Vec2};
+
+use super::options::Options;
+use super::origin::Outcome;
+use super::plan::Completed;
+use super::prepare::View;
+use super::progress::{Phase, Progress};
+use super::unit;
+use crate::color::{ColorModel, Spectral as _};
+use crate::description::{Description, Kind};
+use crate::error::{Error, Problem, Result};
+use crate::film::{Accumulator as _, GROUP, Group, Layout, Sums};
+use crate::filter::Filter;
+use crate::image::Image;
+use crate::integrator::Raster;
+use crate::interaction::Ray;
+use crate::material::Material;
+use crate::raster::{Canvas, Drawn, Fragment, Projection, Shader, Visibility};
+use crate::scene::Scene;
+use crate::sensor::{Film, Window};
+
+/// The integrator whose pictures these are.
+pub(super) const NAME: &str = "raster";
+
+/// Rows of pixels of a unit of work.
+const ROWS: u32 = 16;
+
+/// Whether a render's image is drawn by the z-buffer, so that no ray is traced.
+pub(super) fn draws(description: &Description, options: &Options) -> bool {
+    let integrator = description.root().children(Kind::Integrator);
+    let draws = integrator.first().is_some_and(|i| i.plugin() == NAME);
+    draws && options.adaptive.is_none()
+}
+
+/// What was drawn.
+pub(super) struct Rastered {
+    pub(super) sums: Sums,
+    pub(super) completed: Completed,
+    /// What is not seen as it is.
+    pub(super) notes: Vec<Problem>,
+}
+
+/// What is the same for all pixels.
+struct Picture<'a, C: ColorModel> {
+    scene: &'a Scene<C>,
+    view: &'a View<C>,
+    raster: &'a Raster,
+    film: Film,
+    layout: Layout,
+    projection: Projection,
+    drawn: Drawn<'a>,
+    seen: Visibility,
+    shader: Shader<'a, C>,
+    time: f32,
+}
+
+/// Draws the view of a scene.
+pub(super) fn draw<C: ColorModel>(
+    scene: &Scene<C>,
+    view: &View<C>,
+    raster: &Raster,
+    progress: &dyn Progress,
+) -> Result<Rastered> {
+    let film = film(&view.film);
+    let crop = film.crop;
+    let (time, closes) = view.sensor.shutter();
+    let projection = Projection::of_sensor(&view.sensor, &film, time)?;
+    let tracer = scene.tracer();
+    let is_clear = |shape: u32| {
+        matches!(
+            scene.material_at(scene.made_of(shape).index()),
+            Material::Null(_)
+        )
+    };
+    let hidden = |shape: u32| raster.shade.hide_emitters && scene.shines(shape);
+    let drawn = Drawn::new(tracer, &projection, time, |shape| {
+        !is_clear(shape) && !hidden(shape)
+    })?;
+    let canvas = Canvas {
+        picture: [film.width, film.height],
+        window: crop,
+        pattern: raster.pattern,
+        depth: raster.depth,
+        cull: raster.cull,
+    };
+    let seen = Visibility::draw(&drawn, &projection, &canvas)?;
+    let wavelengths = scene.color().wavelengths(|| 0.5);
+    let shader = Shader::new(scene, raster.shade, wavelengths, time);
+    let casters = Drawn::new(tracer, &projection, time, |shape| {
+        !is_clear(shape) && !scene.shines(shape)
+    })?;
+    let picture = Picture {
+        shader: shader.with_maps(&casters)?,
+        layout: Layout::new(scene.color().channels(), Vec::new()),
+        scene,
+        view,
+        raster,
+        film,
+        projection,
+        drawn,
+        seen,
+        time,
+    };
+    let mut notes = picture.drawn.warnings().to_vec();
+    let mut note = |message: &str| {
+        notes.extend_from_slice(Error::unsupported(message).problems());
+    };
+    if view.sensor.has_lens() {
+        note("the z-buffer sees through a pinhole: all is sharp");
+    }
+    if time < closes && tracer.moves() {
+        note("the z-buffer sees the moment when the shutter opens: nothing is blurred by motion");
+    }
+    let masks =
+        (0..scene.material_count()).any(|i| matches!(scene.material_at(i), Material::Mask(_)));
+    if masks {
+        note("the z-buffer sees no holes: what has a mask is whole");
+    }
+    let mut sums = Sums::new(picture.film.shown(), picture.layout.clone())?;
+    let bands = crop.height.div_ceil(ROWS) as usize;
+    let pixels = u64::from(crop.width) * u64::from(crop.height);
+    progress.begin(Phase::Render, pixels);
+    let add = |part: Sums| {
+        sums.add(&part);
+        Ok::<_, Error>(())
+    };
+    let done = unit::run(0..bands, progress, add, |band| {
+        let part = picture.band(band as u32);
+        progress.advance(u64::from(part.window().height) * u64::from(crop.width), 0);
+        part
+    })?;
+    Ok(Rastered {
+        sums,
+        completed: Completed {
+            samples: if done == bands {
+                raster.pattern.count() as u32
+            } else {
+                0
+            },
+            passes: [u32::from(done == bands), 1],
+            units: [done, bands],
+        },
+        notes,
+    })
+}
+
+/// Tells of no steps, which are not those of the image.
+struct Unseen<'a>(&'a dyn Progress);
+
+impl Progress for Unseen<'_> {
+    fn begin(&self, _phase: Phase, _total: u64) {}
+    fn advance(&self, _steps: u64, _rays: u64) {}
+    fn stop(&self) -> bool {
+        self.0.stop()
+    }
+}
+
+/// A picture as it stands, for whoever waits for another.
+pub(super) fn preview<C: ColorModel>(
+    scene: &Scene<C>,
+    view: &View<C>,
+    progress: &dyn Progress,
+) -> Result<Option<Image>> {
+    let rastered = draw(scene, view, &Raster::preview(), &Unseen(progress))?;
+    let is_whole = rastered.completed.is_whole();
+    let image = is_whole.then(|| rastered.sums.develop(&film(&view.film)));
+    image.transpose()
+}
+
+/// Of the preview.
+pub(super) fn preview_outcome() -> Outcome<'static> {
+    let spp = Raster::preview().pattern.count() as u32;
+    Outcome {
+        spp,
+        samples_complete: spp,
+        adaptive: None,
+    }
+}
+
+/// The film with pixels by themselves.
+fn film(film: &Film) -> Film {
+    Film {
+        filter: Filter::pixel(),
+        sample_border: false,
+        ..film.clone()
+    }
+}
+
+impl<C: ColorModel> Picture<'_, C> {
+    /// Some rows.
+    fn band(&self, band: u32) -> Sums {
+        let crop = self.film.crop;
+        let top = band * ROWS;
+        let window = Window {
+            x: crop.x,
+            y: crop.y + top,
+            width: crop.width,
+            height: ROWS.min(crop.height - top),
+        };
+        let mut sums = Sums::new(window, self.layout.clone()).expect("a band is small");
+        let kernel = self.scene.tracer().kernel();
+        let mut columns = vec![[0.0; GROUP]; self.layout.count()];
+        let mut row = vec![0.0; self.layout.count()];
+        for y in top..top + window.height {
+            for x in 0..crop.width {
+                self.pixel([x, y], &mut row);
+                for (column, value) in columns.iter_mut().zip(&row) {
+                    column[0] = *value;
+                }
+                let group = Group {
+                    pixel: [crop.x + x, crop.y + y],
+                    count: 1,
+                    offsets: [[0.5; GROUP]; 2],
+                };
+                sums.splat(kernel, &self.film.filter, &group, &columns);
+            }
+        }
+        sums
+    }
+
+    /// The values of a pixel: each triangle in it is shaded where the first of its samples lies, or in the pixel's centre where
+    /// all samples are its own.
+    fn pixel(&self, [x, y]: [u32; 2], row: &mut [f32]) {
+        let pixel = y as usize * self.film.crop.width as usize + x as usize;
+        let pattern = &self.raster.pattern;
+        let count = pattern.count();
+        let mut numbers = [None; 16];
+        for (sample, number) in numbers.iter_mut().take(count).enumerate() {
+            *number = self.seen.number(pixel, sample);
+        }
+        let numbers = &numbers[..count];
+        let mut sum = C::Sample::zero();
+        let mut alpha = 0.0;
+        for (sample, number) in numbers.iter().enumerate() {
+            if numbers[..sample].contains(number) {
+                continue;
+            }
+            let share = numbers.iter().filter(|other| *other == number).count();
+            let [dx, dy] = match share == count {
+                true => [0.5; 2],
+                false => pattern.place(sample),
+            };
+            let Window {
+                x: left, y: top, ..
+            } = self.film.crop;
+            let place = DVec2::new(f64::from(left + x) + dx, f64::from(top + y) + dy);
+            let (color, opaque) = self.sample(place, *number);
+            let weight = share as f32 / count as f32;
+            sum += color * weight;
+            alpha += opaque * weight;
+        }
+        let color = self.scene.color();
+        color.develop(&sum, self.shader.wavelengths(), row);
+        if let Some(last) = row.last_mut() {
+            *last = alpha;
+        }
+    }
+
+    fn sample(&self, place: DVec2, number: Option<u32>) -> (C::Sample, f32) {
+        let ray = self.ray(place);
+        match number {
+            None => self.shader.background(&ray),
+            Some(number) => {
+                let fragment = Fragment::new(&self.drawn, &self.projection, number, place);
+                let is_perspective = self.projection.is_perspective();
+                (self.shader.fragment(&ray, &fragment, is_perspective), 1.0)
+            }
+        }
+    }
+
+    /// The sensor's ray through a place of the film, in pixels.
+    fn ray(&self, place: DVec2) -> Ray {
+        let size = DVec2::new(self.film.width.into(), self.film.height.into());
+        let place = (place / size).as_vec2();
+        self.view.sensor.ray(place, Vec2::splat(0.5), self.time)
+    }
+}
