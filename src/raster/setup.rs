@@ -183,6 +183,7 @@ impl Facet {
         let bottom = self.rows.1.min(i64::from(rows.end) - 1);
         let scale = 1.0 / self.area as f64;
         let step = 1_i64 << grid.bits;
+        let is_column = self.columns.0 == self.columns.1;
         for (sample, [inset_x, inset_y]) in grid.samples.iter().enumerate() {
             let x = (self.columns.0 << grid.bits) + inset_x;
             for row in top..=bottom {
@@ -198,17 +199,14 @@ impl Facet {
                     // A sample on the edge counts where that is a left one or one at the top.
                     let counts = dy < 0 || (dy == 0 && to.x > from.x);
                     let inner = value - i64::from(!counts);
-                    if along == 0 {
-                        if inner < 0 {
+                    // Most triangles of a large mesh are in one column, where nothing is to be divided.
+                    if inner < 0 {
+                        if along <= 0 || is_column {
                             last = -1;
-                        }
-                    } else if along > 0 {
-                        if inner < 0 {
+                        } else {
                             first = first.max((-inner + along - 1) / along);
                         }
-                    } else if inner < 0 {
-                        last = -1;
-                    } else {
+                    } else if along < 0 && !is_column {
                         last = last.min(inner / -along);
                     }
                 }
