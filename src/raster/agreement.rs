@@ -22,8 +22,10 @@ use crate::sensor::{Film, Sensor, Window};
 pub const TOLERANCE: f64 = 1e-4;
 /// Which part of the pixels may differ.
 pub const ALLOWED: f64 = 1e-4;
-/// So near to an edge, in pixels, rays of single precision do not tell one triangle from its neighbour.
-const ON_EDGE: f64 = 1.0 / 512.0;
+/// So far, in pixels, rays of single precision do not know where they go: next to an edge they do not tell one triangle from
+/// its neighbour, and what changes faster than the tolerance over that way, as coordinates on a triangle that is smaller than
+/// a pixel, may differ by that change.
+const UNKNOWN: f64 = 1.0 / 512.0;
 
 /// How a quantity compares.
 #[derive(Clone, Debug, Serialize)]
@@ -169,7 +171,16 @@ pub fn agreement<C: ColorModel>(
             let number = visibility.number(y * crop.width as usize + x, 0);
             let place = DVec2::new(x as f64 + 0.5, y as f64 + 0.5) + first;
             let fragment = number.map(|n| Fragment::new(&drawn, &projection, n, place));
-            row.push(Some(differences(sight, fragment.as_ref(), &mut tally)));
+            let mut apart = differences(sight, fragment.as_ref(), &mut tally);
+            let is_far = |apart: &Option<f64>| apart.is_some_and(|apart| apart > TOLERANCE);
+            if let (Some(number), Some(fragment), true) =
+                (number, &fragment, apart[DEPTH..].iter().any(is_far))
+            {
+                let around = [DVec2::X, DVec2::Y, DVec2::NEG_X, DVec2::NEG_Y]
+                    .map(|way| Fragment::new(&drawn, &projection, number, place + UNKNOWN * way));
+                forgive(&mut apart, sight, fragment, &around);
+            }
+            row.push(Some(apart));
         }
         (row, tally)
     });
@@ -312,7 +323,7 @@ fn differences(sight: &Sight<'_>, fragment: Option<&Fragment>, tally: &mut Tally
     let position = fragment.position.as_vec3();
     differences[POSITION] = Some(apart(position, at.position) / distance);
     let is_same = hit.primitive == at.primitive;
-    if !is_same && fragment.edge < ON_EDGE {
+    if !is_same && fragment.edge < UNKNOWN {
         tally.on_edges += 1;
     } else {
         differences[PRIMITIVE] = unequal(hit.primitive, at.primitive);
@@ -332,4 +343,32 @@ fn differences(sight: &Sight<'_>, fragment: Option<&Fragment>, tally: &mut Tally
         differences[UV] = Some(uv / size);
     }
     differences
+}
+
+/// Takes away what a quantity changes between a fragment and those around it.
+fn forgive(
+    differences: &mut Differences,
+    sight: &Sight<'_>,
+    fragment: &Fragment,
+    around: &[Fragment; 4],
+) {
+    let distance = sight.at.as_ref().map_or(1.0, |at| f64::from(at.t));
+    let mut forgive = |which: usize, change: &dyn Fn(&Fragment) -> f64| {
+        let most = around.iter().map(change).fold(0.0, f64::max);
+        if let Some(difference) = differences[which].as_mut().filter(|d| d.is_finite()) {
+            *difference = (*difference - most).max(0.0);
+        }
+    };
+    let way = |other: &Fragment| (other.position - fragment.position).length() / distance;
+    forgive(DEPTH, &way);
+    forgive(POSITION, &way);
+    forgive(GEO_NORMAL, &|other| apart(other.normal, fragment.normal));
+    forgive(
+        SH_NORMAL,
+        &|other| match (other.shading, fragment.shading) {
+            (Some(a), Some(b)) => apart(a, b),
+            _ => 0.0,
+        },
+    );
+    forgive(UV, &|other| (other.uv - fragment.uv).length().into());
 }
