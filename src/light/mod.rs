@@ -6,11 +6,17 @@ mod block;
 mod brightness;
 mod constant;
 mod directional;
+mod directionalarea;
 mod envmap;
 mod grid;
 mod point;
 mod projector;
 mod spot;
+mod sunsky;
+mod timed_sunsky;
+
+mod skylight;
+mod sun_position;
 
 use std::sync::Arc;
 
@@ -115,10 +121,13 @@ family! {
         "area" => Area(area::Area<C>),
         "constant" => Constant(constant::Constant<C>),
         "directional" => Directional(directional::Directional<C>),
+        "directionalarea" => DirectionalArea(directionalarea::DirectionalArea<C>),
         "envmap" => Envmap(envmap::Envmap<C>),
         "point" => Point(point::Point<C>),
         "projector" => Projector(projector::Projector<C>),
         "spot" => Spot(spot::Spot<C>),
+        "sunsky" => SunSky(sunsky::SunSky<C>),
+        "timed_sunsky" => TimedSunSky(timed_sunsky::TimedSunSky<C>),
     }
 }
 
