@@ -20,6 +20,7 @@ pub(crate) mod family;
 pub mod interaction;
 
 pub mod compare;
+pub mod denoise;
 pub mod display;
 pub mod filter;
 pub mod relight;

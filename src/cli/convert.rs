@@ -3,12 +3,14 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use etendue::denoise::Denoiser;
 use etendue::display::{self, srgb};
 use etendue::error::{Error, Location, Result};
 use etendue::image::{self, Image, Metadata};
 use etendue::sensor::Window;
 use serde_json::json;
 
+use super::denoise::{self, DenoiseArguments};
 use super::display::DisplayArguments;
 use super::memory::MemoryArguments;
 use super::output::{self, Names};
@@ -40,6 +42,8 @@ pub(super) struct Arguments {
     #[command(flatten)]
     display: DisplayArguments,
     #[command(flatten)]
+    denoising: DenoiseArguments,
+    #[command(flatten)]
     memory: MemoryArguments,
     /// No warnings
     #[arg(short, long)]
@@ -63,11 +67,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     for output in &outputs {
         image::check_writable(output)?;
     }
+    let denoiser = arguments.denoising.denoiser(0)?;
     if let Some(columns) = arguments.sheet {
         let images: Result<Vec<Image>> = arguments
             .inputs
             .iter()
-            .map(|i| read(arguments, i))
+            .map(|i| read(arguments, denoiser.as_ref(), i))
             .collect();
         write(
             arguments,
@@ -78,7 +83,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         return Ok(status::DONE);
     }
     for (input, output) in arguments.inputs.iter().zip(&outputs) {
-        let image = read(arguments, input)?;
+        let image = read(arguments, denoiser.as_ref(), input)?;
         let metadata = Metadata::default().with("converted_from", input.display().to_string());
         write(arguments, output, &image, metadata)?;
     }
@@ -110,13 +115,16 @@ fn outputs(arguments: &Arguments) -> Result<Vec<PathBuf>> {
 }
 
 /// An image's linear values, or those of the part that is asked for.
-fn read(arguments: &Arguments, input: &Path) -> Result<Image> {
+fn read(arguments: &Arguments, denoiser: Option<&Denoiser>, input: &Path) -> Result<Image> {
     let of_input = |error: Error| error.at(&Location::of_file(input));
     let picture = image::read(input, &arguments.memory.budget().open())?;
     if !arguments.quiet {
         report::warnings(&picture.warnings);
     }
     let mut image = srgb::linear(picture);
+    if let Some(denoiser) = denoiser {
+        image = denoise::applied(denoiser, &image).map_err(of_input)?;
+    }
     if let Some(name) = &arguments.layer {
         image = image.layer(name).map_err(of_input)?;
     }

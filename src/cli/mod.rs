@@ -11,6 +11,7 @@ mod color;
 mod compare;
 mod convert;
 mod crosscheck;
+mod denoise;
 mod info;
 mod merge;
 mod mesh;
@@ -63,6 +64,7 @@ enum Command {
     Compare(Box<compare::Arguments>),
     Convert(convert::Arguments),
     Crosscheck(Box<crosscheck::Arguments>),
+    Denoise(denoise::Arguments),
     Info(info::Arguments),
     Merge(merge::Arguments),
     Mesh(mesh::Arguments),
@@ -89,6 +91,7 @@ pub(crate) fn run() -> ExitCode {
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Convert(arguments) => convert::run(&arguments),
         Command::Crosscheck(arguments) => crosscheck::run(&arguments),
+        Command::Denoise(arguments) => denoise::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
         Command::Merge(arguments) => merge::run(&arguments),
         Command::Mesh(arguments) => mesh::run(&arguments),

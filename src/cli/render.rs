@@ -7,6 +7,7 @@ use clap::{Args, ValueEnum};
 use etendue::accel::{Build, Method};
 use etendue::budget::Budget;
 use etendue::compare::map::{Map, robust_top};
+use etendue::denoise::Denoiser;
 use etendue::description::{self, Description, Kind, Value};
 use etendue::display;
 use etendue::error::{Error, Problem, Result};
@@ -18,6 +19,7 @@ use etendue::render::{
 use glam::DVec3;
 use serde_json::json;
 
+use super::denoise::{self, DenoiseArguments};
 use super::display::DisplayArguments;
 use super::images::{Images, Item, Request};
 use super::memory::{RUN, RunArguments};
@@ -56,6 +58,8 @@ pub(super) struct Arguments {
     image: ImageArguments,
     #[command(flatten)]
     display: DisplayArguments,
+    #[command(flatten)]
+    denoising: DenoiseArguments,
     #[command(flatten)]
     staging: StagingArguments,
     /// Seed of the random numbers: one seed, one image
@@ -162,6 +166,7 @@ Examples:
   etendue render terrain.ply -o terrain.png --cache ~/.cache/etendue
   etendue render dragon.ply -o dragon.png --stats --heatmap steps.png
   etendue render room.xml -o room.png --exposure auto --view agx
+  etendue render room.xml -o room.png --spp 16 --denoise
   etendue render part.stl -o part.png --material metal --azimuth -60 --background transparent
   etendue render scan.ply -o scan.png --light sun --write-scene scan.xml";
 
@@ -223,6 +228,14 @@ impl Arguments {
         }
     }
 
+    /// What is written into a description.
+    fn overrides(&self) -> Overrides {
+        Overrides {
+            denoise: self.denoising.denoise,
+            ..self.image.overrides()
+        }
+    }
+
     /// Refuses what cannot go together.
     fn check(&self) -> Result<()> {
         if let Some(least) = self.min_spp.filter(|least| *least > self.max_spp) {
@@ -236,6 +249,7 @@ impl Arguments {
             (self.heatmap.is_some(), "--heatmap"),
             (self.snapshot.is_some(), "--snapshot"),
             (self.preview, "--preview"),
+            (self.denoising.denoise, "--denoise"),
         ];
         let is_part = is_part(Path::new(&self.output));
         match of_whole.into_iter().find(|(given, _)| *given) {
@@ -302,6 +316,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     let wanted = items.iter().filter(|item| !arguments.skips(item));
     output::check_writable(wanted.flat_map(Item::files))?;
     let mut series = Series::new(arguments, budget, stop);
+    let threads = arguments.run.threads.map_or(0, |threads| threads.get());
+    series.denoiser = arguments.denoising.denoiser(threads)?;
     let style = arguments.style();
     let mut endings = Vec::new();
     for (input, error) in failed {
@@ -371,6 +387,8 @@ struct Series<'a> {
     /// Warnings that were told already.
     told: Vec<Problem>,
     stop: Stop,
+    /// Found before anything is rendered, so that it is there in the end.
+    denoiser: Option<Denoiser>,
 }
 
 /// What is known of an image before it is rendered.
@@ -415,6 +433,7 @@ impl<'a> Series<'a> {
             budget,
             told: Vec::new(),
             stop,
+            denoiser: None,
         }
     }
 
@@ -616,7 +635,7 @@ impl<'a> Series<'a> {
         if let (Some(path), Some(text)) = (&arguments.write_scene, text) {
             etendue::file::write_atomically(path, text.as_bytes())?;
         }
-        self.arguments.image.overrides().apply(&mut description);
+        self.arguments.overrides().apply(&mut description);
         Ok((options, description))
     }
 
@@ -634,13 +653,17 @@ impl<'a> Series<'a> {
             return Err(Error::input(message).help("give a longer --time-limit"));
         }
         let Rendered {
-            image,
+            mut image,
             window,
-            metadata,
+            mut metadata,
             report,
             provenance,
             ..
         } = rendered;
+        if let Some(denoiser) = &self.denoiser {
+            image = denoise::applied(denoiser, &image)?;
+            metadata = metadata.with("denoiser", denoise::name(denoiser));
+        }
         let display = self.arguments.display.transform();
         display::save_window(&item.output, &image, &window, &metadata, &display)?;
         if let Some(provenance) = provenance {

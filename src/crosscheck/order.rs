@@ -59,6 +59,7 @@ impl Order {
             height,
         };
         Overrides {
+            denoise: false,
             spp: self.spp,
             sampler: self.sampler.clone(),
             size: self.size,

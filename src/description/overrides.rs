@@ -22,6 +22,22 @@ impl Description {
         node.properties.retain(knows);
     }
 
+    /// Puts a plugin of the same kind between a node and one that is nested in it; the answer is the new one.
+    pub fn wrap(&mut self, parent: NodeId, child: NodeId, plugin: &str) -> NodeId {
+        let id = NodeId(self.nodes.len() as u32);
+        let kind = self.nodes[child.index()].kind;
+        let mut node = Node::new(kind, plugin, Location::command_line());
+        let nested = Property::new("", Value::Object(child), Location::command_line(), 0);
+        node.properties.push(nested);
+        self.nodes.push(node);
+        for property in &mut self.nodes[parent.index()].properties {
+            if property.value == Value::Object(child) {
+                property.value = Value::Object(id);
+            }
+        }
+        id
+    }
+
     /// The nested plugins of a kind, in file order.
     pub fn children_of(&self, parent: NodeId, kind: Kind) -> Vec<NodeId> {
         let nested = |property: &Property| match property.value {

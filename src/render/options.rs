@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use super::plugins::plugins;
 use crate::accel::{Build, Method};
+use crate::denoise::{ALBEDO, NORMAL};
 use crate::description::{Description, Kind, NodeId, Value};
 use crate::sensor::Window;
 
@@ -102,6 +103,8 @@ pub struct Overrides {
     pub integrator: Option<String>,
     /// The integrator's `max_depth`.
     pub max_depth: Option<i64>,
+    /// Whether the image is made for [`crate::denoise`]: with the box filter, and with its guides as layers.
+    pub denoise: bool,
 }
 
 impl Overrides {
@@ -116,8 +119,13 @@ impl Overrides {
             let innermost = innermost(description, integrator);
             description.set(innermost, "max_depth", Value::Integer(depth));
         }
-        for sensor in description.children_of(root, Kind::Sensor) {
+        for sensor in description.sensors() {
             self.apply_to_sensor(description, sensor);
+        }
+        if self.denoise {
+            let guides = format!("{ALBEDO}:albedo, {NORMAL}:sh_normal");
+            let aov = description.wrap(root, integrator, "aov");
+            description.set(aov, "aovs", Value::String(guides));
         }
     }
 
@@ -127,6 +135,10 @@ impl Overrides {
             description.set(sensor, "shutter_close", Value::Float(close));
         }
         let film = description.child_or_new(sensor, Kind::Film, "hdrfilm");
+        if self.denoise {
+            let filter = description.child_or_new(film, Kind::Filter, "box");
+            replace(description, filter, "box");
+        }
         let mut set =
             |name: &str, value: u32| description.set(film, name, Value::Integer(value.into()));
         if let Some((width, height)) = self.size {

@@ -14,7 +14,7 @@ const LAYERS: &[&[&str]] = &[
     &["description", "image", "mesh"],
     &["family", "interaction"],
     &[
-        "compare", "display", "filter", "relight", "sampler", "shape", "texture",
+        "compare", "denoise", "display", "filter", "relight", "sampler", "shape", "texture",
     ],
     &["phase", "sensor"],
     &["accel", "light", "material", "medium"],
