@@ -4,17 +4,22 @@
 
 mod blendbsdf;
 mod bumpmap;
+mod circular;
 mod conductor;
 mod dielectric;
 mod diffuse;
 mod hair;
 mod mask;
+mod measured;
 mod normalmap;
 mod null;
 mod phong;
 mod plastic;
+mod polarizer;
+mod pplastic;
 mod principled;
 mod principledthin;
+mod retarder;
 mod roughconductor;
 mod roughdielectric;
 mod roughplastic;
@@ -28,6 +33,8 @@ mod fresnel;
 mod ior;
 mod microfacet;
 mod perturbed;
+mod tensor_file;
+mod warp2d;
 
 use glam::{Vec2, Vec3};
 
@@ -148,17 +155,22 @@ family! {
     pub enum Material<C>: Bsdf, context Palettes<C>, visitor Visitor {
         "blendbsdf" => BlendBsdf(blendbsdf::BlendBsdf<C>),
         "bumpmap" => BumpMap(bumpmap::BumpMap<C>),
+        "circular" => Circular(circular::Circular<C>),
         "conductor" => Conductor(conductor::Conductor<C>),
         "dielectric" => Dielectric(dielectric::Dielectric<C>),
         "diffuse" => Diffuse(diffuse::Diffuse<C>),
         "hair" => Hair(hair::Hair<C>),
         "mask" => Mask(mask::Mask<C>),
+        "measured" => Measured(measured::Measured<C>),
         "normalmap" => NormalMap(normalmap::NormalMap<C>),
         "null" => Null(null::Null),
         "phong" => Phong(phong::Phong<C>),
         "plastic" => Plastic(plastic::Plastic<C>),
+        "polarizer" => Polarizer(polarizer::Polarizer<C>),
+        "pplastic" => PPlastic(pplastic::PPlastic<C>),
         "principled" => Principled(principled::Principled<C>),
         "principledthin" => PrincipledThin(principledthin::PrincipledThin<C>),
+        "retarder" => Retarder(retarder::Retarder<C>),
         "roughconductor" => RoughConductor(roughconductor::RoughConductor<C>),
         "roughdielectric" => RoughDielectric(roughdielectric::RoughDielectric<C>),
         "roughplastic" => RoughPlastic(roughplastic::RoughPlastic<C>),

@@ -1,6 +1,7 @@
 //! What every material must do, looped over the family.
 
 use std::path::Path;
+use std::sync::LazyLock;
 
 use glam::{Vec2, Vec3};
 
@@ -21,6 +22,10 @@ const MATERIALS: &[(&str, &str)] = &[
     (
         "bumpmap",
         r#"<bsdf type="bumpmap"><texture type="checkerboard"/><bsdf type="roughconductor"/></bsdf>"#,
+    ),
+    (
+        "circular",
+        r#"<bsdf type="circular"><rgb name="transmittance" value="1, 0.5, 0"/></bsdf>"#,
     ),
     (
         "conductor",
@@ -45,6 +50,14 @@ const MATERIALS: &[(&str, &str)] = &[
         r#"<bsdf type="mask"><float name="opacity" value="0.7"/><bsdf type="diffuse"><float name="reflectance" value="1"/></bsdf></bsdf>"#,
     ),
     (
+        "measured",
+        r#"<bsdf type="measured"><string name="filename" value="round.bsdf"/></bsdf>"#,
+    ),
+    (
+        "measured",
+        r#"<bsdf type="measured"><string name="filename" value="brushed.bsdf"/></bsdf>"#,
+    ),
+    (
         "normalmap",
         r#"<bsdf type="normalmap"><texture name="normalmap" type="rawconstant"><vector name="value" value="0.6, 0.45, 0.95"/></texture><bsdf type="diffuse"/></bsdf>"#,
     ),
@@ -63,6 +76,16 @@ const MATERIALS: &[(&str, &str)] = &[
         "plastic",
         r#"<bsdf type="plastic"><boolean name="nonlinear" value="true"/><float name="int_ior" value="1.9"/><rgb name="diffuse_reflectance" value="1, 0.27, 0.36"/></bsdf>"#,
     ),
+    ("polarizer", r#"<bsdf type="polarizer"/>"#),
+    ("pplastic", r#"<bsdf type="pplastic"/>"#),
+    (
+        "pplastic",
+        r#"<bsdf type="pplastic"><string name="distribution" value="ggx"/><float name="alpha_u" value="0.6"/><float name="alpha_v" value="0.2"/><float name="eta" value="1.8"/><rgb name="diffuse_reflectance" value="1, 0.2, 0"/></bsdf>"#,
+    ),
+    (
+        "pplastic",
+        r#"<bsdf type="pplastic"><boolean name="sample_visible" value="false"/><float name="alpha" value="0.3"/></bsdf>"#,
+    ),
     ("principled", r#"<bsdf type="principled"/>"#),
     (
         "principled",
@@ -77,6 +100,10 @@ const MATERIALS: &[(&str, &str)] = &[
         r#"<bsdf type="principledthin"><float name="spec_trans" value="0.5"/><float name="diff_trans" value="0.8"/><float name="spec_tint" value="0.5"/><float name="sheen" value="0.2"/></bsdf>"#,
     ),
     ("principledthin", r#"<bsdf type="principledthin"/>"#),
+    (
+        "retarder",
+        r#"<bsdf type="retarder"><rgb name="transmittance" value="1, 0.5, 0"/></bsdf>"#,
+    ),
     (
         "roughconductor",
         r#"<bsdf type="roughconductor"><string name="material" value="Au"/></bsdf>"#,
@@ -128,9 +155,53 @@ const MATERIALS: &[(&str, &str)] = &[
     ),
 ];
 
+/// Files that some of them read.
+static FILES: LazyLock<tempfile::TempDir> = LazyLock::new(|| {
+    let folder = tempfile::tempdir().unwrap();
+    let half = -std::f32::consts::PI;
+    for (name, phi) in [
+        ("round", vec![0.0]),
+        ("brushed", vec![half, 0.75 * half, 0.5 * half]),
+    ] {
+        let theta = vec![0.1, 0.5, 0.9, 1.5];
+        let (phis, thetas) = (phi.len(), theta.len());
+        let numbers = |count: usize, seed: u64, least: f32, most: f32| -> Vec<f32> {
+            let number = |i| least + (most - least) * random::unit(random::bits(seed, i));
+            (0..count as u32).map(number).collect()
+        };
+        let outer = phis * thetas;
+        let bytes = tensor_file::tests::written(&[
+            ("phi_i", &[phis], phi),
+            ("theta_i", &[thetas], theta),
+            ("ndf", &[6, 5], numbers(30, 1, 0.5, 1.0)),
+            ("sigma", &[4, 4], numbers(16, 2, 0.5, 1.0)),
+            (
+                "vndf",
+                &[phis, thetas, 6, 5],
+                numbers(outer * 30, 3, 0.2, 1.0),
+            ),
+            (
+                "luminance",
+                &[phis, thetas, 4, 4],
+                numbers(outer * 16, 4, 0.2, 1.0),
+            ),
+            (
+                "rgb",
+                &[phis, thetas, 3, 4, 4],
+                numbers(outer * 48, 5, 0.02, 0.1),
+            ),
+            ("description*", &[4], vec![109.0; 4]),
+            ("jacobian*", &[1], vec![0.0]),
+        ]);
+        std::fs::write(folder.path().join(format!("{name}.bsdf")), bytes).unwrap();
+    }
+    folder
+});
+
 fn build(text: &str) -> Material<Rgb> {
     let text = format!(r#"<scene version="3.0.0">{text}</scene>"#);
-    let scene = Description::parse(&text, Path::new("test.xml"), &Options::default()).unwrap();
+    let path = FILES.path().join("test.xml");
+    let scene = Description::parse(&text, &path, &Options::default()).unwrap();
     Material::build(&scene.root().children(Kind::Bsdf)[0], &Palettes::new(Rgb)).unwrap()
 }
 
@@ -283,6 +354,9 @@ fn reflection_is_reciprocal() {
     // A turned normal is not the surface's, and its cosine not the one that light is counted by. What a fibre absorbs is
     // told by one of the two directions.
     let turned = |name: &str| ["bumpmap", "normalmap", "hair"].contains(&name);
+    // A turned normal is not the surface's, and its cosine not the one that light is counted by.
+    // And what was measured need not be.
+    let turned = |name: &str| ["bumpmap", "measured", "normalmap"].contains(&name);
     for (name, text) in MATERIALS.iter().filter(|(name, _)| !turned(name)) {
         let material = build(text);
         for i in 0..2000 {
