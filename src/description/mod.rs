@@ -231,6 +231,22 @@ pub struct Description {
 }
 
 impl Description {
+    /// The scene's sensors in file order: those at the top, and those in shapes at the top.
+    pub fn sensors(&self) -> Vec<NodeId> {
+        let mut sensors = Vec::new();
+        for property in &self.nodes[NodeId::ROOT.index()].properties {
+            let Value::Object(id) = property.value else {
+                continue;
+            };
+            match self.nodes[id.index()].kind {
+                Kind::Sensor => sensors.push(id),
+                Kind::Shape => sensors.extend(self.children_of(id, Kind::Sensor)),
+                _ => {}
+            }
+        }
+        sensors
+    }
+
     /// Whether the `to_world` of a shape is an animation.
     pub fn has_motion(&self) -> bool {
         let moves = |property: &Property| matches!(property.value, Value::Animation(_));

@@ -406,6 +406,13 @@ impl<'a> Properties<'a> {
         }
     }
 
+    /// The first plugin of that kind, in file order, that this one is nested in.
+    pub fn holder(&self, kind: Kind) -> Option<Properties<'a>> {
+        let holds = |p: &Property| matches!(p.value, Value::Object(id) if id == self.id);
+        let mut nodes = self.description.nodes_of(kind);
+        nodes.find(|node| node.node.properties.iter().any(holds))
+    }
+
     /// The plugin that one of the properties holds.
     pub fn held(&self, property: &Property) -> Option<Properties<'a>> {
         match property.value {

@@ -68,10 +68,10 @@ pub(super) fn black<C: ColorModel>(
             "look at the sensor's to_world, near_clip and far_clip; `etendue info` tells where the scene is",
         ),
     };
-    let sensors = description.root().children(Kind::Sensor);
+    let sensors = description.sensors();
     let error = Error::input(message).help(help);
     let error = match sensors.get(job.sensor) {
-        Some(sensor) => error.at(sensor.location()),
+        Some(sensor) => error.at(description.node(*sensor).location()),
         None => error,
     };
     error.problems().first().cloned()

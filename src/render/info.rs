@@ -74,7 +74,7 @@ impl Session {
         progress: &dyn Progress,
     ) -> Result<SceneInfo> {
         let contents = self.contents(description, options, progress)?;
-        let sensors = description.children_of(description.root().node_id(), Kind::Sensor);
+        let sensors = description.sensors();
         let sensor = |id: &NodeId| {
             let look = Look {
                 description,

@@ -382,6 +382,7 @@ mod tests {
             (Kind::Shape, "group" | "shapegroup") => "<shape type='sphere'/>",
             (Kind::Integrator, "moment") => "<integrator type='path'/>",
             (Kind::Phase, "blendphase") => "<phase type='hg'/><phase type='hg'/>",
+            (Kind::Sensor, "batch") => "<sensor type='perspective'/>",
             (Kind::Film, "specfilm") => "<spectrum name='red' value='550:0, 600:1, 650:0'/>",
             _ => "",
         }
@@ -402,8 +403,11 @@ mod tests {
                     sensor("")
                 )
             }
-            Kind::Emitter if plugin.contains("'area'") => {
+            Kind::Emitter if plugin.contains("area'") => {
                 format!("<shape type='sphere'>{plugin}</shape>{}", sensor(""))
+            }
+            Kind::Sensor if plugin.contains("'irradiancemeter'") => {
+                format!("<shape type='sphere'>{plugin}</shape>")
             }
             Kind::Medium => {
                 let named = plugin.replacen("<medium", "<medium name='interior'", 1);

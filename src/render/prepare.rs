@@ -21,7 +21,7 @@ use super::rastered;
 use super::{Report, Seconds, timed};
 use crate::accel::{Build, CacheUse, Method, Recipe};
 use crate::color::ColorModel;
-use crate::description::{Description, Kind, NodeId, Properties};
+use crate::description::{Description, Kind, NodeId};
 use crate::error::{self, Error, Location, Problem, Problems, Result};
 use crate::film::Layout;
 use crate::image::{self, Image, Window};
@@ -127,8 +127,8 @@ pub(super) struct Job<'k, C: ColorModel> {
 /// The sensor that the options choose.
 pub(super) fn sensor(description: &Description, options: &Options) -> Result<NodeId> {
     let root = description.root();
-    let sensors = root.children(Kind::Sensor);
-    let chosen = sensors.get(options.sensor).map(Properties::node_id);
+    let sensors = description.sensors();
+    let chosen = sensors.get(options.sensor).copied();
     chosen.ok_or_else(|| {
         let message = match sensors.len() {
             0 => "the scene has no sensor".to_owned(),
@@ -179,6 +179,7 @@ pub(super) fn view<C: ColorModel>(description: &Description, sensor: NodeId) -> 
                     .map(|medium| medium.node_id()),
                 footprint: sensor
                     .as_ref()
+                    .filter(|sensor| sensor.is_projective())
                     .zip(film.as_ref())
                     .zip(sampler.as_ref())
                     .map(|((sensor, film), sampler)| {
@@ -231,9 +232,9 @@ fn media(description: &Description, integrator: &str) -> Option<Problem> {
 fn others<C: ColorModel>(description: &Description, chosen: NodeId) -> Result<Vec<Problem>> {
     let mut problems = Problems::default();
     let mut warnings = Vec::new();
-    let sensors = description.root().children(Kind::Sensor);
-    for sensor in sensors.iter().filter(|s| s.node_id() != chosen) {
-        let Err(error) = view::<C>(description, sensor.node_id()) else {
+    let sensors = description.sensors();
+    for sensor in sensors.into_iter().filter(|sensor| *sensor != chosen) {
+        let Err(error) = view::<C>(description, sensor) else {
             continue;
         };
         for problem in error.problems() {
@@ -495,7 +496,7 @@ pub(super) fn prepare<'k, C: ColorModel>(ask: &'k mut Ask<'_>, color: C) -> Resu
     let findings = plugins::examine(description);
     problems.extend(findings.problems);
     problems.finish()?;
-    let (Some(view), Some(kept)) = (view, ask.shelf.kept.as_ref()) else {
+    let (Some(mut view), Some(kept)) = (view, ask.shelf.kept.as_ref()) else {
         unreachable!("a part that is missing is a problem");
     };
     let facts = &kept.facts;
@@ -510,6 +511,7 @@ pub(super) fn prepare<'k, C: ColorModel>(ask: &'k mut Ask<'_>, color: C) -> Resu
         .scene
         .downcast_ref()
         .expect("equal colours have equal types");
+    view.sensor.enclose(scene.tracer().bounds());
     if is_kept && ask.previews() {
         ask.preview(scene, &view)?;
     }

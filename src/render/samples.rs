@@ -96,11 +96,16 @@ impl<C: ColorModel> Batch<'_, C> {
         self.row.resize(layout.colors().len(), 0.0);
         self.columns.resize(layout.count(), [0.0; GROUP]);
         let mut first = 0;
+        let weighted = !self.job.view.sensor.is_projective();
         for group in &self.groups {
             for sample in 0..group.count {
                 let index = first + sample;
                 let Estimate { radiance, alpha } = &estimates.values[index];
                 color.develop(radiance, &starts[index].wavelengths, &mut self.row);
+                if weighted {
+                    let weight = weight(&self.job.view, group, sample);
+                    self.row.iter_mut().for_each(|value| *value *= weight);
+                }
                 let extra = &estimates.extra[index * extra..][..extra];
                 let values = self.row.iter().chain(extra).chain([alpha]);
                 for (column, value) in self.columns.iter_mut().zip(values) {
@@ -116,6 +121,18 @@ impl<C: ColorModel> Batch<'_, C> {
         self.starts.clear();
         self.groups.clear();
     }
+}
+
+/// What the sensor multiplies the radiance of a sample of the group by.
+fn weight<C: ColorModel>(view: &View<C>, group: &Group, sample: usize) -> f32 {
+    let film = &view.film;
+    let margin = film.margin() as f32;
+    let [x, y] = [0, 1].map(|axis| {
+        let pixel = group.pixel[axis] as f32 - margin;
+        pixel + group.offsets[axis][sample]
+    });
+    let place = glam::Vec2::new(x / film.width as f32, y / film.height as f32);
+    view.sensor.weight(place)
 }
 
 /// Where samples go.

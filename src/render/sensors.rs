@@ -1,11 +1,11 @@
 //! The sensors of a scene by the names that people give them: an id, or a number in file order from 0.
 
-use crate::description::{Description, Kind, NodeId};
+use crate::description::{Description, NodeId};
 use crate::error::{Error, Result};
 
 /// The sensors of a scene, in file order.
 pub fn sensors(description: &Description) -> Vec<NodeId> {
-    description.children_of(description.root().node_id(), Kind::Sensor)
+    description.sensors()
 }
 
 /// The sensors' ids, or their numbers where they have none, in file order.

@@ -16,8 +16,8 @@ use crate::medium::Medium;
 use crate::shape::{self, Geometry};
 use crate::texture::Palettes;
 
-/// The light that stands on a shape.
-const AREA: &str = "area";
+/// The lights that stand on a shape.
+const AREA: [&str; 2] = ["area", "directionalarea"];
 /// What the media of a shape are called.
 const INTERIOR: &str = "interior";
 const EXTERIOR: &str = "exterior";
@@ -153,13 +153,16 @@ impl<C: ColorModel> Builder<'_, C> {
         // What is not known is for the lights' family to name.
         let known = |emitter: &Properties<'_>| Light::<C>::NAMES.contains(&emitter.plugin());
         let light = match &emitter {
-            Some(emitter) if emitter.plugin() != AREA && known(emitter) => {
+            Some(emitter) if !AREA.contains(&emitter.plugin()) && known(emitter) => {
                 let error = Error::input(format!(
                     "emitter \"{}\" cannot stand on a shape",
                     emitter.plugin()
                 ));
-                self.problems
-                    .push(error.at(emitter.location()).help("only \"area\" can"));
+                self.problems.push(
+                    error
+                        .at(emitter.location())
+                        .help("only \"area\" and \"directionalarea\" can"),
+                );
                 None
             }
             Some(emitter) if geometry.area().is_infinite() => {
@@ -237,7 +240,7 @@ pub fn light_names(description: &Description) -> Vec<String> {
         names.visit(&shape);
     }
     for light in root.children(Kind::Emitter) {
-        if !["ambient", AREA].contains(&light.plugin()) {
+        if light.plugin() != "ambient" && !AREA.contains(&light.plugin()) {
             names.add(light.id());
         }
     }
@@ -306,7 +309,7 @@ pub fn build<C: ColorModel>(
     let mut environment: Option<(LightId, Properties<'_>)> = None;
     for emitter in root.children(Kind::Emitter) {
         // It is the light of the shapes that refer to it.
-        if emitter.plugin() == AREA {
+        if AREA.contains(&emitter.plugin()) {
             if !builder.worn.contains(&emitter.node_id()) {
                 let warning =
                     emitter.error("", "no shape refers to this light, which lights nothing");

@@ -1,8 +1,12 @@
 //! Sensors: from a place on the film, a point of the lens and a time to a ray.
 
+mod batch;
+mod distant;
 mod film;
+mod irradiancemeter;
 mod orthographic;
 mod perspective;
+mod radiancemeter;
 mod thinlens;
 
 use glam::{Mat3, Mat4, Vec2, Vec3};
@@ -14,6 +18,7 @@ use crate::family::family;
 use crate::interaction::Ray;
 use crate::lanes::{self, Lanes};
 use crate::math::{Moving, Transform};
+use crate::shape::Bounds;
 
 pub use film::{Coordinates, FILMS, Film, PixelFormat, Window};
 pub(crate) use perspective::{FIELD_OF_VIEW, tangent_x};
@@ -26,6 +31,15 @@ pub trait Camera: std::fmt::Debug + Send + Sync {
     /// Whether the lens point matters.
     fn has_lens(&self) -> bool {
         false
+    }
+    /// Whether places on the film are directions from a camera, so that [`Camera::projection`] and
+    /// [`Camera::neighbours`] have a meaning. What measures light has none.
+    fn is_projective(&self) -> bool {
+        true
+    }
+    /// What the radiance along the ray through `film` is multiplied by. 1 for everything that is projective.
+    fn weight(&self, _film: Vec2) -> f32 {
+        1.0
     }
     /// From world to camera space at `time`: z forward, y up, x to the image's left.
     fn world_to_camera(&self, time: f32) -> Mat4;
@@ -42,13 +56,26 @@ family! {
     /// Every sensor there is.
     #[derive(Clone, Debug)]
     pub enum Sensor: Camera, context Film {
+        "batch" => Batch(batch::Batch),
+        "distant" => Distant(distant::Distant),
+        "irradiancemeter" => IrradianceMeter(irradiancemeter::IrradianceMeter),
         "orthographic" => Orthographic(orthographic::Orthographic),
         "perspective" => Perspective(perspective::Perspective),
+        "radiancemeter" => RadianceMeter(radiancemeter::RadianceMeter),
         "thinlens" => ThinLens(thinlens::ThinLens),
     }
 }
 
 impl Sensor {
+    /// Tells the sensor how far the scene reaches, which is known only when that is there.
+    pub fn enclose(&mut self, scene: Bounds) {
+        match self {
+            Self::Batch(batch) => batch.enclose(scene),
+            Self::Distant(distant) => distant.enclose(scene),
+            _ => {}
+        }
+    }
+
     /// The rays through places of the film and of the lens, as [`Camera::ray`], at `times`; as many as there are of these,
     /// which fit into the lanes.
     #[inline(always)]
@@ -63,6 +90,12 @@ impl Sensor {
             Self::Orthographic(sensor) => (&sensor.mount, sensor.segments(film)),
             Self::Perspective(sensor) => (&sensor.mount, sensor.segments(film)),
             Self::ThinLens(sensor) => (sensor.mount(), sensor.segments(film, lens)),
+            _ => {
+                for (lane, time) in times.iter().enumerate() {
+                    take(self.ray(film.lane(lane), lens.lane(lane), *time));
+                }
+                return;
+            }
         };
         if !mount.to_world.is_still() {
             for (lane, time) in times.iter().enumerate() {
@@ -93,14 +126,21 @@ struct Mount {
     shutter: (f32, f32),
 }
 
-/// What every sensor reads.
+/// Where a sensor stands.
+const TO_WORLD: Row = motion(
+    "to_world",
+    "from camera space (z forward, y up, x to the left) to the world",
+);
+
+/// What every camera reads besides [`COMMON`].
 const MOUNT: &[Row] = &[
-    motion(
-        "to_world",
-        "from camera space (z forward, y up, x to the left) to the world",
-    ),
+    TO_WORLD,
     float("near_clip", 1e-2, "what is nearer is not seen; scene units").positive(),
     float("far_clip", 1e4, "what is farther is not seen; scene units").positive(),
+];
+
+/// What every sensor reads.
+const COMMON: &[Row] = &[
     float("shutter_open", 0.0, "when light begins to count"),
     float("shutter_close", 0.0, "when it ends").absent("shutter_open"),
     nested(Kind::Film, "size, pixel format and filter"),
@@ -117,23 +157,16 @@ impl Mount {
             let message = format!("far_clip ({far}) must be greater than near_clip ({near})");
             return Err(properties.error("far_clip", message));
         }
-        let open = properties.float("shutter_open")?;
-        let close = properties.given("shutter_close")?.unwrap_or(open);
-        if close < open {
-            let message = format!("shutter_close ({close}) lies before shutter_open ({open})");
-            return Err(properties.error("shutter_close", message));
-        }
         Ok(Self {
             to_world,
             near: near as f32,
             far: far as f32,
-            shutter: (open as f32, close as f32),
+            shutter: shutter(properties)?,
         })
     }
 
     fn world_to_camera(&self, time: f32) -> Mat4 {
-        let inverse = self.to_world.at(time).inverse();
-        Mat4::from_translation(inverse.translation()) * Mat4::from_mat3(inverse.linear())
+        inverse(&self.to_world, time)
     }
 
     /// The ray from the camera-space point `start` to `end`.
@@ -163,6 +196,23 @@ impl Mount {
     }
 }
 
+/// The inverse of `to_world` at `time`.
+fn inverse(to_world: &Moving, time: f32) -> Mat4 {
+    let inverse = to_world.at(time).inverse();
+    Mat4::from_translation(inverse.translation()) * Mat4::from_mat3(inverse.linear())
+}
+
+/// When the shutter is open: (open, close).
+fn shutter(properties: &Properties<'_>) -> Result<(f32, f32)> {
+    let open = properties.float("shutter_open")?;
+    let close = properties.given("shutter_close")?.unwrap_or(open);
+    if close < open {
+        let message = format!("shutter_close ({close}) lies before shutter_open ({open})");
+        return Err(properties.error("shutter_close", message));
+    }
+    Ok((open as f32, close as f32))
+}
+
 /// A matrix times vectors.
 #[inline(always)]
 fn product<F: Lanes>(matrix: Mat3, v: lanes::Vec3<F>) -> lanes::Vec3<F> {
@@ -178,9 +228,12 @@ mod tests {
     use crate::description::declared::Preset;
     use crate::description::{Description, Options};
 
-    /// Every sensor of the family, with the least that it needs.
-    fn every_sensor(film: &Film) -> impl Iterator<Item = (&'static str, Sensor)> {
-        Sensor::PLUGINS.iter().map(|(name, plugin)| {
+    /// Every camera of the family, with the least that it needs.
+    fn every_camera(film: &Film) -> impl Iterator<Item = (&'static str, Sensor)> {
+        let cameras = Sensor::PLUGINS
+            .iter()
+            .filter(|(_, plugin)| plugin.row("near_clip").is_some());
+        cameras.map(|(name, plugin)| {
             let required = plugin.rows().filter(|row| row.preset == Preset::Required);
             let needs: String = required
                 .map(|row| format!("<float name='{}' value='{}'/>", row.name, row.range.least))
@@ -196,13 +249,13 @@ mod tests {
     }
 
     #[test]
-    fn every_sensor_s_rays_go_from_near_to_far_where_its_projection_puts_them() {
+    fn every_camera_s_rays_go_from_near_to_far_where_its_projection_puts_them() {
         let film = Film {
             width: 200,
             height: 100,
             ..Film::default()
         };
-        for (name, sensor) in every_sensor(&film) {
+        for (name, sensor) in every_camera(&film) {
             for (x, y) in [(0.5, 0.5), (0.8, 0.3), (0.01, 0.99)] {
                 let ray = sensor.ray(Vec2::new(x, y), Vec2::splat(0.5), 0.0);
                 assert!((ray.direction.length() - 1.0).abs() < 1e-5, "{name}");
@@ -221,8 +274,8 @@ mod tests {
     }
 
     #[test]
-    fn every_sensor_without_a_lens_ignores_the_place_on_it() {
-        for (name, sensor) in every_sensor(&Film::default()) {
+    fn every_camera_without_a_lens_ignores_the_place_on_it() {
+        for (name, sensor) in every_camera(&Film::default()) {
             let through = |lens| sensor.ray(Vec2::new(0.3, 0.6), lens, 0.0);
             let same = through(Vec2::new(0.1, 0.2)) == through(Vec2::new(0.9, 0.4));
             // An aperture of radius 0 is no lens either.

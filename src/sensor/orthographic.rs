@@ -23,6 +23,7 @@ impl Orthographic {
         about: "parallel rays; the film covers [−1, 1] in x",
         properties: &[
             super::MOUNT,
+            super::COMMON,
             &[float("focus_distance", 1e4, "everything is sharp")
                 .positive()
                 .without_effect()],

@@ -88,6 +88,7 @@ impl Perspective {
         about: "a pinhole",
         properties: &[
             super::MOUNT,
+            super::COMMON,
             FIELD_OF_VIEW,
             &[
                 float(

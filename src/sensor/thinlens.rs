@@ -86,6 +86,7 @@ impl ThinLens {
         about: "a lens of finite size, sharp at one distance",
         properties: &[
             super::MOUNT,
+            super::COMMON,
             super::FIELD_OF_VIEW,
             &[
                 float("aperture_radius", 0.0, "of the lens; scene units")

@@ -112,6 +112,15 @@ impl TriangleMesh {
         self.areas.get_or_init(build).as_ref()
     }
 
+    /// See [`super::Geometry::evenly`].
+    pub(super) fn evenly(&self, u: Vec2) -> Option<SurfaceSample> {
+        if let Some(chart) = self.chart(u) {
+            return Some(chart.point);
+        }
+        let drawn = self.areas()?.sample(u.y);
+        Some(self.triangle_point(drawn.index as u32, Vec2::new(u.x, drawn.rest)))
+    }
+
     /// A point of the mesh, not yet with a density.
     fn at(&self, place: Place) -> SurfaceSample {
         let Place {

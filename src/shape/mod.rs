@@ -179,6 +179,38 @@ impl Geometry {
 }
 
 impl Geometry {
+    /// A point drawn evenly over the area, without a density, as Mitsuba spreads `u` over the surface where that has an
+    /// equation; `None` of a surface that cannot be drawn so.
+    pub fn evenly(&self, u: Vec2) -> Option<SurfaceSample> {
+        let parameters = match self {
+            Self::Mesh(mesh) => return mesh.evenly(u),
+            Self::Sphere(_) => {
+                let polar = (1.0 - 2.0 * u.y).clamp(-1.0, 1.0).acos();
+                Vec2::new(u.x, polar * std::f32::consts::FRAC_1_PI)
+            }
+            Self::Disk(_) => {
+                let p = Vec2::from(lanes::warp::concentric_disk::<f32>(u.into()));
+                let turns = p.y.atan2(p.x) / std::f32::consts::TAU;
+                Vec2::new(p.length(), turns)
+            }
+            // One whose circles are none, or of two radii, is not even in its parameters.
+            Self::Frustum(frustum) => {
+                let stretch = |x, y| frustum.chart(Vec2::new(x, y)).map(|chart| chart.stretch);
+                let whole = stretch(0.0, 0.0)?;
+                let other = [stretch(0.125, 0.5)?, stretch(0.25, 1.0)?];
+                let even = other.iter().all(|s| (s / whole - 1.0).abs() < 1e-3);
+                even.then_some(Vec2::new(u.y, u.x))?
+            }
+            Self::Bsplines(_)
+            | Self::Deforming(_)
+            | Self::Ellipsoids(_)
+            | Self::Lines(_)
+            | Self::Plane(_)
+            | Self::Sdf(_) => return None,
+        };
+        self.chart(parameters).map(|chart| chart.point)
+    }
+
     /// [`Surface::sample`] in lanes.
     #[inline(always)]
     pub fn sample_lanes<F: Lanes>(
@@ -329,6 +361,7 @@ const COMMON: &[Row] = &[
     TO_WORLD,
     BSDF,
     nested(Kind::Emitter, "area, where it gives light"),
+    nested(Kind::Sensor, "irradiancemeter, where its light is measured"),
     medium("interior", "what it encloses"),
     medium("exterior", "what is around it"),
     nested(Kind::Medium, "one that is called neither is ignored").without_effect(),

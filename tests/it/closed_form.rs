@@ -472,3 +472,112 @@ fn half_the_horizon_is_half_the_light() {
     let expected = 0.6 / PI * FRAC_PI_2;
     Mean::of_channel(&image, 1).assert_is(expected, 0.01, "half a sky");
 }
+
+// ---- sensors that measure
+
+/// A film of that size, without a filter that mixes its pixels.
+fn measuring(width: u32, height: u32, samples: u32) -> String {
+    format!(
+        r#"<film type="hdrfilm"><integer name="width" value="{width}"/><integer name="height" value="{height}"/>
+            <string name="pixel_format" value="rgb"/><rfilter type="box"/></film>
+        <sampler type="independent"><integer name="sample_count" value="{samples}"/></sampler>"#
+    )
+}
+
+#[test]
+fn an_irradiance_meter_reads_what_a_disc_above_it_sends() {
+    // A disc of radius 1 at height h over the middle sends π L / (1 + h²) there.
+    let film = measuring(8, 8, 4096);
+    let text = scene(&format!(
+        r#"{}<shape type="rectangle"><transform name="to_world"><scale value="0.01"/></transform>
+            <sensor type="irradiancemeter">{film}</sensor></shape>
+        <shape type="disk"><transform name="to_world"><rotate x="1" angle="180"/><translate z="2"/></transform>
+            <emitter type="area"><rgb name="radiance" value="5"/></emitter></shape>"#,
+        path(2),
+    ));
+    let expected = PI * 5.0 / 5.0;
+    Mean::of_channel(&image_of(&text, 4), 0).assert_is(expected, 0.02, "a disc");
+}
+
+#[test]
+fn every_shape_measures_the_irradiance_of_even_light_all_over() {
+    let film = measuring(6, 5, 16);
+    for shape in ["rectangle", "disk", "sphere", "cylinder", "cube"] {
+        let text = scene(&format!(
+            r#"{}<shape type="{shape}"><transform name="to_world"><scale value="30"/><translate x="-9" y="7"/></transform>
+                <sensor type="irradiancemeter">{film}</sensor></shape>
+            <emitter type="constant"><rgb name="radiance" value="2"/></emitter>"#,
+            path(2),
+        ));
+        let image = image_of(&text, 5);
+        for (x, y) in (0..5).flat_map(|y| (0..6).map(move |x| (x, y))) {
+            let value = f64::from(image.get(x, y, 0));
+            assert!((value / (2.0 * PI) - 1.0).abs() < 1e-5, "{shape}: {value}");
+        }
+    }
+}
+
+#[test]
+fn meters_and_distant_sensors_see_what_their_rays_meet_alone_and_in_a_batch() {
+    let wall = r#"<shape type="rectangle"><emitter type="area"><rgb name="radiance" value="3"/></emitter></shape>"#;
+    let one = measuring(1, 1, 400);
+    let meter = |at: &str, film: &str| {
+        format!(
+            r#"<sensor type="radiancemeter"><point name="origin" value="{at}"/>
+            <vector name="direction" value="0, 0, -2"/>{film}</sensor>"#
+        )
+    };
+    let distant = |target: &str| {
+        format!(
+            r#"<sensor type="distant"><vector name="direction" value="0, 0, -1"/>{target}{one}</sensor>"#
+        )
+    };
+    let smaller = r#"<shape type="rectangle" name="target"><transform name="to_world"><scale value="0.5"/></transform></shape>"#;
+    let larger = r#"<shape type="rectangle" name="target"><transform name="to_world"><scale x="2"/></transform></shape>"#;
+    for (sensor, expected, error) in [
+        (meter("0.5, -0.9, 4", &one), 3.0, 1e-5),
+        (meter("0.5, -1.1, 4", &one), 0.0, 1e-5),
+        (meter("0.5, 0.5, -4", &one), 0.0, 1e-5),
+        (
+            distant(r#"<point name="target" value="0.9, 0.9, 0"/>"#),
+            3.0,
+            1e-5,
+        ),
+        (distant(smaller), 3.0, 1e-5),
+        (distant(larger), 1.5, 0.3),
+        // The square fills 2/π of the circle around it.
+        (distant(""), 6.0 / PI, 0.3),
+    ] {
+        let image = image_of(&scene(&format!("{}{sensor}{wall}", path(1))), 6);
+        let value = f64::from(image.get(0, 0, 0));
+        assert!((value - expected).abs() <= error, "{sensor}: {value}");
+    }
+    let sensors = meter("0, 0, 4", "") + &meter("5, 0, 4", "");
+    let batch = format!(
+        r#"<sensor type="batch">{sensors}<shape type="cube"><transform name="to_world"><translate z="9"/></transform>
+            <sensor type="irradiancemeter"/></shape>{}</sensor>"#,
+        measuring(6, 2, 4)
+    );
+    let around = r#"<emitter type="constant"/>"#;
+    let image = image_of(&scene(&format!("{}{batch}{wall}{around}", path(1))), 7);
+    let row: Vec<f32> = (0..4).map(|x| image.get(x, 1, 0)).collect();
+    assert_eq!(row, [3.0, 3.0, 1.0, 1.0]);
+    // The cube's faces see the wall nowhere or as a small part of even light.
+    assert!((4..6).all(|x| (image.get(x, 0, 0) - std::f32::consts::PI).abs() < 1.0));
+}
+
+#[test]
+fn sheets_that_polarize_pass_the_share_that_light_without_polarisation_keeps() {
+    for (sheet, share) in [("polarizer", 0.5), ("circular", 0.5), ("retarder", 1.0)] {
+        let text = scene(&format!(
+            r#"{}{}<emitter type="constant"/><shape type="rectangle"><transform name="to_world"><scale value="9"/></transform>
+                <bsdf type="{sheet}"><rgb name="transmittance" value="1, 0.5, 0.25"/></bsdf></shape>"#,
+            path(-1),
+            meter([0.0, 0.0, 3.0], [0.0, 0.0, -1.0], 4, 4),
+        ));
+        let image = image_of(&text, 8);
+        for (c, transmittance) in [1.0, 0.5, 0.25].into_iter().enumerate() {
+            assert_eq!(image.get(1, 1, c), share * transmittance, "{sheet}");
+        }
+    }
+}

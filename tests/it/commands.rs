@@ -48,7 +48,7 @@ const CASES: &[(&str, &str, &str, bool)] = &[
     // A sensor that nobody looks through may be one that is lacking; one that is wrong may not.
     (
         "<emitter",
-        r#"<sensor type="irradiancemeter"/><emitter"#,
+        r#"<sensor type="distant"><shape type="plane" name="target"/></sensor><emitter"#,
         "",
         true,
     ),
@@ -61,7 +61,7 @@ const CASES: &[(&str, &str, &str, bool)] = &[
     ),
     (
         "<emitter",
-        r#"<sensor type="irradiancemeter"/><emitter"#,
+        r#"<sensor type="distant"><shape type="plane" name="target"/></sensor><emitter"#,
         "--sensor 1",
         false,
     ),
@@ -164,14 +164,14 @@ fn check_and_info_say_what_render_says() {
 fn every_sensor_of_a_scene_can_be_checked() {
     let case = (
         "<emitter",
-        r#"<sensor type="irradiancemeter"/><emitter"#,
+        r#"<sensor type="distant"><shape type="plane" name="target"/></sensor><emitter"#,
         "",
         false,
     );
     let place = Place::of(&case);
     let (status, told) = said(&place.run("check a.xml", "--sensor all"));
     assert_eq!(status, Some(1));
-    assert!(told.contains("irradiancemeter"), "{told}");
+    assert!(told.contains("cannot measure a plane"), "{told}");
 }
 
 /// What the other commands do not have.
