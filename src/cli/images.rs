@@ -1,11 +1,12 @@
 //! What a call is to render: inputs × frames × sensors, each with an output of its own, known before the
 //! first of them is begun.
 
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 use etendue::budget::Budget;
 use etendue::error::{Error, Result};
-use etendue::render::Session;
+use etendue::render::{Session, is_mesh};
 
 use super::output::Names;
 use super::overrides::{self, Chosen, Sensors};
@@ -74,11 +75,51 @@ pub(super) struct Request<'a> {
     pub(super) budget: &'a Budget,
 }
 
+/// The inputs, with what stands in folders among them by name in place of these.
+fn files(inputs: &[PathBuf]) -> Result<Vec<PathBuf>> {
+    let mut all = Vec::with_capacity(inputs.len());
+    for input in inputs {
+        if !input.is_dir() {
+            all.push(input.clone());
+            continue;
+        }
+        let refused = |e: std::io::Error| Error::system("read", input, &e);
+        let entries = std::fs::read_dir(input).map_err(refused)?;
+        let mut files = Vec::new();
+        for entry in entries {
+            let path = entry.map_err(refused)?.path();
+            let is_scene = path
+                .extension()
+                .is_some_and(|e| e.eq_ignore_ascii_case("xml"));
+            if (is_scene || is_mesh(&path)) && path.is_file() {
+                files.push(path);
+            }
+        }
+        if files.is_empty() {
+            let message = format!("no scene and no mesh is in the folder {}", input.display());
+            return Err(Error::input(message).help("folders in it are not looked into"));
+        }
+        files.sort();
+        all.append(&mut files);
+    }
+    Ok(all)
+}
+
+/// Where images go: into a folder as pictures with the inputs' names.
+fn pattern(output: &str) -> Cow<'_, str> {
+    if output.ends_with(['/', std::path::MAIN_SEPARATOR]) || Path::new(output).is_dir() {
+        let folder = output.trim_end_matches(['/', std::path::MAIN_SEPARATOR]);
+        return format!("{folder}/{{name}}.png").into();
+    }
+    output.into()
+}
+
 impl Request<'_> {
     /// All images, by input, frame and sensor.
     pub(super) fn images(&self) -> Result<Images> {
         let mut images = Images::default();
-        for input in self.inputs {
+        let output = pattern(self.output);
+        for input in &files(self.inputs)? {
             let chosen = match self.chosen(input) {
                 Ok(chosen) => chosen,
                 Err(error) => {
@@ -97,7 +138,7 @@ impl Request<'_> {
                         input: input.clone(),
                         frame,
                         sensor: sensor.number,
-                        output: names.expand(self.output)?,
+                        output: names.expand(&output)?,
                         heatmap: self.heatmap.map(|path| names.expand(path)).transpose()?,
                     });
                 }

@@ -23,7 +23,7 @@ pub(super) struct MemoryArguments {
 pub(super) struct RunArguments {
     #[command(flatten)]
     pub(super) memory: MemoryArguments,
-    /// Threads; one a processor by default. The image does not depend on it
+    /// Threads; 0, the default, is one a processor. The image does not depend on it
     #[arg(long, value_name = "N", value_parser = parse::threads, help_heading = RUN)]
     pub(super) threads: Option<NonZeroUsize>,
 }

@@ -26,14 +26,15 @@ pub(super) fn spp() -> RangedI64ValueParser<u32> {
     clap::value_parser!(u32).range(1..=MAX_SAMPLES.into())
 }
 
-/// How many threads: up to eight a processor, and up to 256 on any machine.
+/// How many threads: up to eight a processor, and up to 256 on any machine; 0 is one a processor.
 pub(super) fn threads(text: &str) -> Parsed<NonZeroUsize> {
     const ANYWHERE: usize = 256;
     let processors = thread::available_parallelism().map_or(1, NonZeroUsize::get);
     let most = ANYWHERE.max(8 * processors);
     let number: usize = text.parse().map_err(|_| "write a number such as 8")?;
+    let number = if number == 0 { processors } else { number };
     (NonZeroUsize::new(number).filter(|n| n.get() <= most)).ok_or_else(|| {
-        format!("{text} is not between 1 and {most}; this machine has {processors} processors")
+        format!("{text} is not between 0 and {most}; this machine has {processors} processors")
     })
 }
 

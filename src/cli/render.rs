@@ -35,8 +35,8 @@ use super::{output, report, status};
 
 /// Render scenes or meshes to images
 ///
-/// INPUT is a Mitsuba 3 scene (.xml) or a bare mesh (.ply, .obj), which gets an automatic camera on a
-/// ground under a soft sky. The extension of OUT says the format: .exr (linear, float32, with metadata and
+/// INPUT is a Mitsuba 3 scene (.xml), a bare mesh (.ply, .obj, .stl, .serialized, .gltf, .glb), which gets an automatic
+/// camera on a ground under a soft sky, or a folder of these. The extension of OUT says the format: .exr (linear, float32, with metadata and
 /// all channels), .hdr (linear), .png (sRGB), or .part: the sums that `etendue merge` makes images of.
 ///
 /// Ctrl-C, SIGTERM and SIGHUP end a render early: the tiles under way are finished and the image of what
@@ -44,10 +44,10 @@ use super::{output, report, status};
 #[derive(Args, Debug)]
 #[command(after_help = format!("{EXAMPLES}\n\n{}", status::HELP))]
 pub(super) struct Arguments {
-    /// Scene files (.xml) or meshes (.ply, .obj)
+    /// Scenes (.xml), meshes (.ply, .obj, .stl, .serialized, .gltf, .glb) or folders of them
     #[arg(required = true, value_name = "INPUT")]
     inputs: Vec<PathBuf>,
-    /// Where the image goes; {name} stands for the input's name, {frame} or {frame:04} for the frame's
+    /// Where the image goes; a folder is OUT/{name}.png. {name} stands for the input's name, {frame} or {frame:04} for the frame's
     /// number, {sensor} for the sensor's id or number
     #[arg(short, long, value_name = "OUT")]
     output: String,
@@ -157,6 +157,7 @@ Examples:
   etendue render scenes/cornell-box.xml -o cornell-box.png
   etendue render dragon.ply -o dragon.png --size 1920x1080 --spp 256
   etendue render a.xml b.xml -o out/{name}.exr --seed 7
+  etendue render meshes/ -o out/
   etendue render scene.xml -o crop.exr --crop 100,80,64,64 --max-depth 2 -D spp=16
   etendue render dragon.ply -o out/{frame:03}.png --turntable 36
   etendue render walk.xml -o out/{frame:04}.exr --frames 0:240 -D body=body-{frame:04}.ply

@@ -181,6 +181,25 @@ fn a_plugin_is_explained_by_its_name_and_a_family_by_its_tag() {
 }
 
 #[test]
+fn a_folder_is_rendered_into_a_folder_by_the_names_of_its_files() {
+    let place = Place::new();
+    fs::create_dir(place.path("meshes")).unwrap();
+    for name in ["b.ply", "a.ply"] {
+        fs::write(place.path("meshes").join(name), MESH).unwrap();
+    }
+    fs::write(place.path("meshes/read.me"), "not a mesh").unwrap();
+    let run = place.run("render meshes scene.xml -o out/ --size 8x6 --spp 1 --threads 0 --json");
+    let told = run.ends_with(0).objects();
+    let outputs: Vec<_> = told.iter().map(|object| object["output"].clone()).collect();
+    assert_eq!(outputs, ["out/a.png", "out/b.png", "out/scene.png"]);
+    assert!(place.bytes("out/a.png") == place.bytes("out/b.png"));
+    fs::create_dir(place.path("empty")).unwrap();
+    let run = place.run("render empty -o out/");
+    let told = run.ends_with(1).stderr();
+    assert!(told.contains("no scene and no mesh"), "{told}");
+}
+
+#[test]
 fn frames_define_their_number_and_name_their_files() {
     let place = Place::new();
     let run = place.run("render scene.xml -o f{frame:02}.exr --frames 0:3:2 -D x={frame} --json");
@@ -571,9 +590,9 @@ fn numbers_of_the_command_line_have_bounds() {
     for (arguments, said) in [
         (
             "render scene.xml -o a.exr --threads 100000",
-            "100000 is not between 1 and",
+            "100000 is not between 0 and",
         ),
-        ("check scene.xml --threads 0", "0 is not between 1 and"),
+        ("check scene.xml --threads -1", "unexpected argument"),
         (
             "render scene.xml -o a.exr --spp 4000000000",
             "4000000000 is not in 1..=",
@@ -582,10 +601,10 @@ fn numbers_of_the_command_line_have_bounds() {
             "render scene.xml -o a.exr --turntable 2 --pivot 0,inf,0",
             "write it as X,Y,Z",
         ),
-        ("profile --threads 100000", "100000 is not between 1 and"),
+        ("profile --threads 100000", "100000 is not between 0 and"),
         (
             "crosscheck scene.xml --threads 100000",
-            "100000 is not between 1 and",
+            "100000 is not between 0 and",
         ),
     ] {
         let run = place.run(arguments);
