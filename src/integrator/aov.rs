@@ -151,6 +151,10 @@ impl<C: ColorModel> Estimator<C> for Aov<C> {
         channels
     }
 
+    fn renders_media(&self) -> bool {
+        (self.nested.iter()).any(|nested| nested.integrator.renders_media())
+    }
+
     fn estimate(
         &self,
         scene: &Scene<C>,
