@@ -1,6 +1,7 @@
 //! Does the z-buffer see what rays see? Every scene of `scenes/` and every shape, at pixel centres.
 
 use std::fs;
+use std::io::Write;
 use std::num::NonZeroUsize;
 use std::sync::Mutex;
 
@@ -51,9 +52,11 @@ fn rays_and_the_z_buffer_see_the_same_in_every_scene() {
         let found = agreement(description.unwrap_or_else(|e| panic!("{e}")));
         assert!(found.agrees(), "{name}:\n{}", describe_all(&found));
         if found.undrawn > 0 {
-            eprintln!(
+            let _ = writeln!(
+                std::io::stderr(),
                 "SKIPPED, {} pixels of {name}: {:?}",
-                found.undrawn, found.notes
+                found.undrawn,
+                found.notes
             );
             continue;
         }
@@ -124,7 +127,8 @@ fn every_shape_looks_the_same_to_rays_and_to_the_z_buffer() {
     }
     if !skipped.is_empty() {
         skipped.dedup();
-        eprintln!(
+        let _ = writeln!(
+            std::io::stderr(),
             "SKIPPED, for they have no triangles: {}",
             skipped.join(", ")
         );
