@@ -335,8 +335,17 @@ fn every_material_draws_directions_with_the_density_that_it_says() {
                     expected[cell(wo)] += f64::from(value.pdf) * share * f64::from(n);
                 }
             }
+            // What was measured has a density without bound where a mirror would send light, which no grid of points
+            // integrates.
+            let mirrored = Vec3::new(-wi.x, -wi.y, wi.z);
+            let mut left_out = [false; ROWS * COLUMNS];
+            for i in 0..64 {
+                let aside = Vec3::from(warp::uniform_sphere(uniforms(i).1.into())) * 0.1;
+                left_out[cell((mirrored + aside).normalize())] = *name == "measured";
+            }
             let (mut chi2, mut cells) = (0.0, 0.0);
-            for (o, e) in observed.iter().zip(&expected).filter(|(_, e)| **e > 10.0) {
+            let compared = observed.iter().zip(&expected).zip(left_out);
+            for ((o, e), _) in compared.filter(|((_, e), left_out)| **e > 10.0 && !left_out) {
                 chi2 += (o - e).powi(2) / e;
                 cells += 1.0;
             }

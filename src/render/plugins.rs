@@ -441,14 +441,25 @@ mod tests {
         std::fs::write(path("m.obj"), mesh).unwrap();
         let image = crate::image::Image::new(4, 3, ["R", "G", "B"].map(String::from).to_vec());
         crate::image::write(&path("i.exr"), &image, &Default::default()).unwrap();
-        let mut grid = b"VOL\x03".to_vec();
-        grid.extend([1_u32, 1, 1, 1, 1].map(u32::to_le_bytes).concat());
-        grid.extend(
-            [0.0_f32, 0.0, 0.0, 1.0, 1.0, 1.0, 0.5]
-                .map(f32::to_le_bytes)
-                .concat(),
-        );
+        let words = [1_u32, 2, 2, 2, 1].map(u32::to_le_bytes).concat();
+        let numbers = [
+            0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.5, 0.5, 0.5, -0.5_f32,
+        ];
+        let numbers = numbers.map(f32::to_le_bytes).concat();
+        let grid = [&b"VOL\x03"[..], &words, &numbers].concat();
         std::fs::write(path("g.vol"), grid).unwrap();
+        std::fs::write(path("c.txt"), "0 0 0 1\n1 0 0 1\n2 0 0 1\n3 0 0 1\n").unwrap();
+        let columns = [
+            "x", "y", "z", "nx", "ny", "nz", "scale_0", "scale_1", "scale_2",
+        ];
+        let columns = [&columns[..], &["rot_0", "rot_1", "rot_2", "rot_3"]].concat();
+        let columns: String = (columns.iter())
+            .map(|name| format!("property float {name}\n"))
+            .collect();
+        let cloud = format!(
+            "ply\nformat ascii 1.0\nelement vertex 1\n{columns}end_header\n0 0 0 0 0 0 -1 -1 -1 1 0 0 0\n"
+        );
+        std::fs::write(path("e.ply"), cloud).unwrap();
         let mut unread = Vec::new();
         for Listed {
             kind, name, plugin, ..
@@ -482,7 +493,9 @@ mod tests {
                 }
                 let file = match name {
                     "bitmap" | "envmap" => "i.exr",
-                    "gridvolume" => "g.vol",
+                    "gridvolume" | "sdfgrid" => "g.vol",
+                    "bsplinecurve" | "linearcurve" => "c.txt",
+                    "ellipsoids" | "ellipsoidsmesh" => "e.ply",
                     _ => "m.obj",
                 };
                 let text = format!(

@@ -84,7 +84,8 @@ const CASES: &[(&str, &str, &str, bool)] = &[
         false,
     ),
     (INTEGRATOR, r#"<integrator type="pahth"/>"#, "", false),
-    (INTEGRATOR, r#"<integrator type="volpath"/>"#, "", false),
+    (INTEGRATOR, r#"<integrator type="volpath"/>"#, "", true),
+    (INTEGRATOR, r#"<integrator type="ptracer"/>"#, "", false),
     (
         "\"grey\"/>",
         "\"grey\"><float name=\"alpha\" value=\"1\"/></bsdf>",

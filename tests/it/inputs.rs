@@ -83,8 +83,8 @@ const CASES: &[Case<'static>] = &[
     ),
     wrong(
         "a bsdf of Mitsuba's",
-        r#"<shape type="sphere"><bsdf type="hair"/><!--!--></shape>"#,
-        &["bsdf \"hair\" exists in Mitsuba but not in"],
+        r#"<shape type="sphere"><bsdf type="measured_polarized"/><!--!--></shape>"#,
+        &["bsdf \"measured_polarized\" exists in Mitsuba but not in"],
     ),
     wrong(
         "unknown film",
@@ -477,7 +477,7 @@ const CASES: &[Case<'static>] = &[
     ),
     usage("65 bands", "--bands 65", 2, &["65"]),
     usage("a definition without a value", "-D spp", 2, &["name=value"]),
-    usage("threads without number", "--threads 0", 2, &["--threads"]),
+    usage("threads below none", "--threads=-1", 2, &["--threads"]),
     usage(
         "a parameter that the scene lacks",
         "-D nope=1",

@@ -120,6 +120,10 @@ fn integrator(name: &str, known: &Known) -> (String, f64) {
     let path = format!(r#"<integrator type="path">{roulette}</integrator>"#);
     match name {
         "path" => (path, known.path),
+        "volpath" | "volpathmis" => {
+            let volpath = format!(r#"<integrator type="{name}">{roulette}</integrator>"#);
+            (volpath, known.path)
+        }
         "direct" => (r#"<integrator type="direct"/>"#.into(), known.direct),
         "phong" => (
             format!(

@@ -227,6 +227,14 @@ fn scene_of_files(place: &Place) -> Vec<(&'static str, Vec<u8>)> {
         <shape type="rectangle"><texture type="bitmap" name="displacement"><string name="filename" value="heights.png"/>
             </texture><float name="displacement_edge" value="0.5"/></shape>
         <shape type="sphere"><bsdf type="diffuse"><spectrum name="reflectance" filename="curve.spd"/></bsdf></shape>
+        <shape type="bsplinecurve"><string name="filename" value="strands.txt"/></shape>
+        <shape type="linearcurve"><string name="filename" value="lines.txt"/></shape>
+        <shape type="ellipsoids"><string name="filename" value="cloud.ply"/></shape>
+        <shape type="ellipsoidsmesh"><string name="filename" value="cloud.ply"/></shape>
+        <shape type="sdfgrid"><string name="filename" value="distance.vol"/></shape>
+        <shape type="cube"><medium name="interior" type="heterogeneous"><volume name="sigma_t" type="gridvolume">
+            <string name="filename" value="smoke.vol"/></volume></medium></shape>
+        <shape type="sphere"><bsdf type="measured"><string name="filename" value="paint.bsdf"/></bsdf></shape>
         <emitter type="envmap"><string name="filename" value="sky.png"/></emitter>"#;
     const MATERIALS: &str = r#"<bsdf type="diffuse" id="textured"><texture type="bitmap" name="reflectance">
         <string name="filename" value="picture.png"/></texture></bsdf>"#;
@@ -260,6 +268,62 @@ fn scene_of_files(place: &Place) -> Vec<(&'static str, Vec<u8>)> {
         let stream = zlib.finish().unwrap();
         [&[0x1c, 4, 4, 0][..], &stream, &[0; 8], &1_u32.to_le_bytes()].concat()
     };
+    // Eight values on a grid.
+    let grid = |last: f32| -> Vec<u8> {
+        let words = [1_u32, 2, 2, 2, 1].map(u32::to_le_bytes).concat();
+        let numbers = [
+            0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.5, 0.5, 0.5, last,
+        ];
+        let numbers = numbers.map(f32::to_le_bytes).concat();
+        [&b"VOL\x03"[..], &words, &numbers].concat()
+    };
+    // A tensor file: what each field is and where, then their numbers.
+    let measured = |last: f32| -> Vec<u8> {
+        let fields: [(&str, &[u64]); 8] = [
+            ("phi_i", &[1]),
+            ("theta_i", &[2]),
+            ("ndf", &[2, 2]),
+            ("sigma", &[2, 2]),
+            ("vndf", &[1, 2, 2, 2]),
+            ("luminance", &[1, 2, 2, 2]),
+            ("rgb", &[1, 2, 3, 2, 2]),
+            ("jacobian", &[1]),
+        ];
+        const BYTE: u8 = 1;
+        const SINGLE: u8 = 10;
+        let head = |name: &str, shape: &[u64], kind: u8, offset: usize| {
+            let mut head = (name.len() as u16).to_le_bytes().to_vec();
+            head.extend(name.as_bytes());
+            head.extend((shape.len() as u16).to_le_bytes());
+            head.push(kind);
+            head.extend((offset as u64).to_le_bytes());
+            head.extend(shape.iter().flat_map(|size| size.to_le_bytes()));
+            head
+        };
+        let mut file = [&b"tensor_file\0\x01\0"[..], &9_u32.to_le_bytes()].concat();
+        let heads = fields.map(|(name, shape)| head(name, shape, SINGLE, 0).len());
+        let mut offset = file.len() + heads.iter().sum::<usize>();
+        offset += head("description", &[1], BYTE, 0).len();
+        file.extend(head("description", &[1], BYTE, offset));
+        let mut numbers = vec![b'a'];
+        for (name, shape) in fields {
+            file.extend(head(name, shape, SINGLE, offset + numbers.len()));
+            let count = shape.iter().product::<u64>() as u16;
+            let number = |i: u16| match name {
+                "phi_i" | "jacobian" => 0.0,
+                "theta_i" => 0.1 + f32::from(i),
+                _ if name == "rgb" && i + 1 == count => last,
+                _ => 0.5,
+            };
+            numbers.extend((0..count).flat_map(|i| number(i).to_le_bytes()));
+        }
+        [file, numbers].concat()
+    };
+    const CLOUD: &str = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z
+property float nx\nproperty float ny\nproperty float nz\nproperty float scale_0\nproperty float scale_1
+property float scale_2\nproperty float rot_0\nproperty float rot_1\nproperty float rot_2\nproperty float rot_3
+end_header\n0 0 0 0 0 0 -1 -1 -1 1 0 0 0\n";
+    let strands = "0 0 0 0.1\n1 0 0 0.1\n2 0 0 0.1\n3 0 0 0.1\n";
     let obj = "mtllib mesh.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n";
     let files = [
         ("mesh.ply", text(PLY), text(&PLY.replace("0 1 0", "0 2 0"))),
@@ -281,6 +345,20 @@ fn scene_of_files(place: &Place) -> Vec<(&'static str, Vec<u8>)> {
         ("picture.png", picture(100), picture(101)),
         ("sky.png", picture(100), picture(101)),
         ("heights.png", picture(100), picture(101)),
+        (
+            "strands.txt",
+            text(strands),
+            text(&strands.replace('3', "4")),
+        ),
+        ("lines.txt", text(strands), text(&strands.replace('3', "5"))),
+        (
+            "cloud.ply",
+            text(CLOUD),
+            text(&CLOUD.replace("-1 1 0", "-2 1 0")),
+        ),
+        ("distance.vol", grid(-0.5), grid(-0.4)),
+        ("smoke.vol", grid(0.5), grid(0.6)),
+        ("paint.bsdf", measured(0.5), measured(0.4)),
         (
             "mesh.ply.gz",
             gzip(PLY),
