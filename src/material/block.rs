@@ -114,15 +114,15 @@ impl<F: Lanes, S: Spectra<F>> BsdfSamples<F, S> {
     /// `yes` where the mask is set, else `no`.
     #[inline(always)]
     pub(super) fn select(mask: F::Mask, yes: Self, no: Self) -> Self {
-        let either = |yes: F::Mask, no: F::Mask| (mask & yes) | (!mask & no);
+        let not = !mask;
         Self {
-            drawn: either(yes.drawn, no.drawn),
+            drawn: (mask & yes.drawn) | (not & no.drawn),
             wo: Vec3::select(mask, yes.wo, no.wo),
             weight: S::select(mask, yes.weight, no.weight),
             pdf: F::select(mask, yes.pdf, no.pdf),
             eta: F::select(mask, yes.eta, no.eta),
-            delta: either(yes.delta, no.delta),
-            null: either(yes.null, no.null),
+            delta: (mask & yes.delta) | (not & no.delta),
+            null: (mask & yes.null) | (not & no.null),
         }
     }
 }

@@ -259,8 +259,10 @@ impl<C: ColorModel> BlockBsdf<C> for Measured<C> {
         w: &[C::Wavelengths],
     ) -> BsdfValues<F, C::Columns<F>> {
         let mut pdf = F::ROW;
+        let (wi, wo) = (wi.rows(), wo.rows());
         let value = Spectra::from_samples(|lane| {
-            let seen = self.tables.eval(wi.lane(lane).into(), wo.lane(lane).into());
+            let (wi, wo) = (Vec3::<F>::of(&wi, lane), Vec3::<F>::of(&wo, lane));
+            let seen = self.tables.eval(wi.into(), wo.into());
             pdf[lane] = seen.pdf;
             self.color(seen.rgb, &w[lane])
         });

@@ -40,7 +40,7 @@ impl Geometry {
     }
 
     /// One of the primitives of a surface that is no mesh as triangles, as [`Geometry::into_triangles`] makes them; texture
-    /// coordinates are the parameters of the [`Surface::patch`].
+    /// coordinates are the parameters of the [`super::Surface::patch`].
     ///
     /// # Errors
     /// Where it cannot be, or there would be more than `most`.
