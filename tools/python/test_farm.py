@@ -16,6 +16,7 @@ import tempfile
 import threading
 import time
 from pathlib import Path
+from unittest import mock
 
 from distributed import Client, LocalCluster
 
@@ -104,27 +105,39 @@ def bad_luck(client, place, options):
     options.keep_parts = True
     options.say = said = Said()
     folder = place.job.with_suffix(".farm")
-    done = threading.Event()
+    go = place.folder / "go"
+    # From the fourth part on every unit waits for the misfortune, so that its worker has something to lose.
+    waits = place.folder / "waits"
+    waits.write_text(
+        f"""#!/bin/sh
+while [ ! -e '{go}' ] && [ "$(find '{folder}' -name '*.part' | wc -l)" -ge 4 ]; do sleep 0.05; done
+exec '{etendue.command()}' "$@"
+"""
+    )
+    waits.chmod(0o755)
 
     def misfortune():
-        parts = []
-        while len(parts) < 4 and not done.is_set():
-            parts = sorted(folder.glob("*.part"))
-            time.sleep(0.005)
-        if done.is_set():
-            return
+        while len(parts := sorted(folder.glob("*.part"))) < 4:
+            time.sleep(0.01)
         # Cut off: rendered again when its image is merged. Gone: rendered twice if its unit was done.
         parts[0].write_bytes(parts[0].read_bytes()[: parts[0].stat().st_size // 2])
-        victim = sorted(client.scheduler_info(n_workers=-1)["workers"].items())[0]
-        os.kill(client.run(os.getpid, workers=[victim[0]])[victim[0]], signal.SIGKILL)
+        try:
+            busy = []
+            while not busy:
+                busy = [worker for worker, tasks in client.processing().items() if tasks]
+            os.kill(client.run(os.getpid, workers=busy[:1])[busy[0]], signal.SIGKILL)
+            while not said.has("was lost"):
+                time.sleep(0.01)
+        finally:
+            go.touch()
 
-    thread = threading.Thread(target=misfortune)
+    thread = threading.Thread(target=misfortune, daemon=True)
     thread.start()
-    report = farm.render(place.job, client, options)
-    done.set()
+    with mock.patch.dict(os.environ, ETENDUE=str(waits)):
+        report = farm.render(place.job, client, options)
     thread.join()
     place.check(whole, report)
-    assert report.lost_workers and said.has("was lost"), said.lines
+    assert report.lost_workers, report
     assert said.has("merged again") and said.has("damaged"), said.lines
     assert report.units["skipped"] > 0, report.units
 
