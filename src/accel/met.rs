@@ -37,7 +37,7 @@ impl Met<'_> {
 
     /// The rays' directions.
     #[inline(always)]
-    fn directions<F: Lanes>(&self) -> lanes::Vec3<F> {
+    pub fn directions<F: Lanes>(&self) -> lanes::Vec3<F> {
         let mut rows = [F::ROW; 3];
         for lane in 0..self.indices.len() {
             let direction = self.ray(lane).direction;

@@ -4,7 +4,7 @@
 //!
 //! `max_depth`, `rr_depth` and `hide_emitters`: see [`super::limits`].
 
-use super::limits::{self, Limits};
+use super::limits;
 use super::volumetric::Volumetric;
 use super::{Context, Cost, Estimates, Estimator, Start};
 use crate::color::ColorModel;
@@ -25,11 +25,7 @@ impl VolPath {
     };
 
     pub(super) fn build(properties: &Properties<'_>, context: &Context) -> Result<Self> {
-        Ok(Self(Volumetric {
-            limits: Limits::build(properties)?,
-            hide_emitters: properties.boolean("hide_emitters")?,
-            medium: context.medium,
-        }))
+        Volumetric::build(properties, context).map(Self)
     }
 }
 

@@ -1,7 +1,7 @@
 //! `volpathmis`: the same as `volpath`, which combines channels by multiple importance sampling anyway; in Mitsuba these
 //! are two integrators.
 
-use super::limits::{self, Limits};
+use super::limits;
 use super::volumetric::Volumetric;
 use super::{Context, Cost, Estimates, Estimator, Start};
 use crate::color::ColorModel;
@@ -31,11 +31,7 @@ impl VolPathMis {
     };
 
     pub(super) fn build(properties: &Properties<'_>, context: &Context) -> Result<Self> {
-        Ok(Self(Volumetric {
-            limits: Limits::build(properties)?,
-            hide_emitters: properties.boolean("hide_emitters")?,
-            medium: context.medium,
-        }))
+        Volumetric::build(properties, context).map(Self)
     }
 }
 

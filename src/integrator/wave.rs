@@ -54,6 +54,18 @@ impl<T> WithRays<T> {
         self.rays.clear();
         self.things.clear();
     }
+
+    /// Keeps those of which `kept` says so.
+    pub(super) fn keep(&mut self, kept: &[bool]) {
+        keep(&mut self.rays, kept);
+        keep(&mut self.things, kept);
+    }
+}
+
+/// Keeps those items of which `kept` says so.
+pub(super) fn keep<T>(items: &mut Vec<T>, kept: &[bool]) {
+    let mut kept = kept.iter();
+    items.retain(|_| *kept.next().expect("there is an answer an item"));
 }
 
 /// What a bounce does with light.
@@ -343,25 +355,21 @@ impl<'a, C: ColorModel, T, M: Copy> Wave<'a, C, T, M> {
     }
 
     /// What is done with paths before they come to what they have met: they are given with their rays, their hits and
-    /// what a bounce adds to. Those of which `stopped` tells in the end go no further.
+    /// what a bounce adds to. Those of which `goes_on` does not say so in the end go no further.
     pub(super) fn before(
         &mut self,
-        stopped: &mut Vec<bool>,
+        goes_on: &mut Vec<bool>,
         act: impl FnOnce(&mut WithRays<Walker<C, M>>, &[Hit], Outcome<'_, C, T, M>, &mut [bool]),
     ) {
-        stopped.clear();
-        stopped.resize(self.walkers.things.len(), false);
+        goes_on.clear();
+        goes_on.resize(self.walkers.things.len(), true);
         let out = Outcome {
             shadows: &mut self.shadows,
             next: &mut self.next,
         };
-        act(&mut self.walkers, &self.hits, out, stopped);
-        let mut kept = stopped.iter().map(|stopped| !stopped);
-        self.walkers.rays.retain(|_| kept.next().unwrap_or(true));
-        let mut kept = stopped.iter().map(|stopped| !stopped);
-        self.walkers.things.retain(|_| kept.next().unwrap_or(true));
-        let mut kept = stopped.iter().map(|stopped| !stopped);
-        self.hits.retain(|_| kept.next().unwrap_or(true));
+        act(&mut self.walkers, &self.hits, out, goes_on);
+        self.walkers.keep(goes_on);
+        keep(&mut self.hits, goes_on);
     }
 
     /// The slots of paths, and whether each has met a surface.

@@ -280,9 +280,52 @@ fn sun(properties: &Properties<'_>, to_world: &Rotation) -> Result<DVec3> {
     Ok(sun_position::sun(&date, hour, &Place::build(properties)?))
 }
 
-/// A world direction in the sky's own space.
-pub(super) fn to_own(to_world: &Mat3, direction: Vec3) -> Vec3 {
-    to_world.transpose() * direction
+/// A sky as it stands at a moment.
+pub(super) struct Sky<'a, C: ColorModel> {
+    pub(super) light: &'a Skylight<C>,
+    pub(super) moment: &'a Moment,
+    pub(super) draw: &'a Draw,
+    pub(super) to_world: Mat3,
+}
+
+impl<C: ColorModel> Sky<'_, C> {
+    pub(super) fn sample(&self, u: Vec2, w: &C::Wavelengths) -> Option<LightSample<C::Sample>> {
+        let (direction, pdf, sun) = self.draw.sample(self.light, self.moment, u)?;
+        Some(LightSample {
+            direction: self.to_world * direction,
+            target: None,
+            radiance: self.light.radiance(self.moment, direction, sun, w),
+            pdf,
+            delta: false,
+        })
+    }
+
+    /// A world direction in the sky's own space, and whether the sun is seen there.
+    fn own(&self, direction: Vec3) -> (Vec3, bool) {
+        let own = self.to_world.transpose() * direction;
+        (own, self.light.meets_sun(self.moment, own))
+    }
+
+    pub(super) fn radiance(&self, direction: Vec3, w: &C::Wavelengths) -> C::Sample {
+        let (own, sun) = self.own(direction);
+        self.light.radiance(self.moment, own, sun, w)
+    }
+
+    pub(super) fn pdf(&self, direction: Vec3) -> f32 {
+        let (own, sun) = self.own(direction);
+        self.draw.pdf(self.light, self.moment, own, sun)
+    }
+}
+
+impl<C: ColorModel> SunSky<C> {
+    fn sky(&self, time: f32) -> Sky<'_, C> {
+        Sky {
+            light: &self.light,
+            moment: &self.moment,
+            draw: &self.draw,
+            to_world: self.to_world.at(time),
+        }
+    }
 }
 
 impl<C: ColorModel> Emitter<C> for SunSky<C> {
@@ -292,16 +335,7 @@ impl<C: ColorModel> Emitter<C> for SunSky<C> {
         u: Vec2,
         wavelengths: &C::Wavelengths,
     ) -> Option<LightSample<C::Sample>> {
-        let (direction, pdf, sun) = self.draw.sample(&self.light, &self.moment, u)?;
-        Some(LightSample {
-            direction: self.to_world.at(from.time) * direction,
-            target: None,
-            radiance: self
-                .light
-                .radiance(&self.moment, direction, sun, wavelengths),
-            pdf,
-            delta: false,
-        })
+        self.sky(from.time).sample(u, wavelengths)
     }
 
     fn is_environment(&self) -> bool {
@@ -314,15 +348,11 @@ impl<C: ColorModel> Emitter<C> for SunSky<C> {
         time: f32,
         wavelengths: &C::Wavelengths,
     ) -> C::Sample {
-        let own = to_own(&self.to_world.at(time), direction);
-        let sun = self.light.meets_sun(&self.moment, own);
-        self.light.radiance(&self.moment, own, sun, wavelengths)
+        self.sky(time).radiance(direction, wavelengths)
     }
 
     fn environment_pdf(&self, direction: Vec3, time: f32) -> f32 {
-        let own = to_own(&self.to_world.at(time), direction);
-        let sun = self.light.meets_sun(&self.moment, own);
-        self.draw.pdf(&self.light, &self.moment, own, sun)
+        self.sky(time).pdf(direction)
     }
 
     fn power(&self, _color: &C, radius: f64) -> f64 {

@@ -6,9 +6,9 @@ use std::sync::Arc;
 
 use glam::{DVec3, Vec2, Vec3};
 
-use super::skylight::{Air, Moment, Skylight};
+use super::skylight::{Air, Skylight};
 use super::sun_position::{self, Date, Place, YEARS};
-use super::sunsky::{AIR, Draw, to_own};
+use super::sunsky::{AIR, Draw, Sky};
 use super::{Emitter, LightContext, LightSample, Rotation};
 use crate::color::{ColorModel, Spectral as _};
 use crate::description::Properties;
@@ -145,12 +145,19 @@ impl<C: ColorModel> TimedSunSky<C> {
         })
     }
 
-    /// The sky at a time, and how it is drawn; `None` while it is dark.
-    fn at(&self, time: f32) -> Option<(Moment, &Draw)> {
+    /// Asks the sky as it stands at a time; `None` while it is dark.
+    fn with_sky<T>(&self, time: f32, ask: impl FnOnce(Sky<'_, C>) -> T) -> Option<T> {
         let sun = self.clock.sun(time);
         let elevation = sun.z.clamp(-1.0, 1.0).asin() / std::f64::consts::FRAC_PI_2;
         let index = ((elevation * HEIGHTS as f64) as usize).min(HEIGHTS - 1);
-        (sun.z >= 0.0).then(|| (self.light.at(sun), &self.draws[index]))
+        (sun.z >= 0.0).then(|| {
+            ask(Sky {
+                light: &self.light,
+                moment: &self.light.at(sun),
+                draw: &self.draws[index],
+                to_world: self.to_world.at(time),
+            })
+        })
     }
 }
 
@@ -166,15 +173,7 @@ impl<C: ColorModel> Emitter<C> for TimedSunSky<C> {
         u: Vec2,
         wavelengths: &C::Wavelengths,
     ) -> Option<LightSample<C::Sample>> {
-        let (moment, draw) = self.at(from.time)?;
-        let (direction, pdf, sun) = draw.sample(&self.light, &moment, u)?;
-        Some(LightSample {
-            direction: self.to_world.at(from.time) * direction,
-            target: None,
-            radiance: self.light.radiance(&moment, direction, sun, wavelengths),
-            pdf,
-            delta: false,
-        })
+        self.with_sky(from.time, |sky| sky.sample(u, wavelengths))?
     }
 
     fn is_environment(&self) -> bool {
@@ -187,21 +186,12 @@ impl<C: ColorModel> Emitter<C> for TimedSunSky<C> {
         time: f32,
         wavelengths: &C::Wavelengths,
     ) -> C::Sample {
-        let Some((moment, _)) = self.at(time) else {
-            return C::Sample::zero();
-        };
-        let own = to_own(&self.to_world.at(time), direction);
-        let sun = self.light.meets_sun(&moment, own);
-        self.light.radiance(&moment, own, sun, wavelengths)
+        let radiance = self.with_sky(time, |sky| sky.radiance(direction, wavelengths));
+        radiance.unwrap_or(C::Sample::zero())
     }
 
     fn environment_pdf(&self, direction: Vec3, time: f32) -> f32 {
-        let Some((moment, draw)) = self.at(time) else {
-            return 0.0;
-        };
-        let own = to_own(&self.to_world.at(time), direction);
-        let sun = self.light.meets_sun(&moment, own);
-        draw.pdf(&self.light, &moment, own, sun)
+        self.with_sky(time, |sky| sky.pdf(direction)).unwrap_or(0.0)
     }
 
     fn power(&self, _color: &C, radius: f64) -> f64 {

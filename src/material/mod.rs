@@ -33,6 +33,7 @@ mod fresnel;
 mod ior;
 mod microfacet;
 mod perturbed;
+mod sheet;
 mod tensor_file;
 mod warp2d;
 

@@ -9,7 +9,6 @@ use crate::description::Properties;
 use crate::description::declared::Plugin;
 use crate::error::Result;
 use crate::lanes::{Lanes, Mask as _};
-use crate::phase::Phase;
 use crate::sampler::Draws;
 use crate::texture::Palettes;
 
@@ -53,16 +52,8 @@ impl<C: ColorModel> Heterogeneous<C> {
 }
 
 impl<C: ColorModel> Matter<C> for Heterogeneous<C> {
-    fn phase(&self) -> &Phase {
-        &self.common.phase
-    }
-
-    fn emits(&self) -> bool {
-        self.common.emission.is_some()
-    }
-
-    fn samples_emitters(&self) -> bool {
-        self.common.sample_emitters
+    fn common(&self) -> &Common<C> {
+        &self.common
     }
 }
 

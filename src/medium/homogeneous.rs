@@ -7,7 +7,6 @@ use crate::description::Properties;
 use crate::description::declared::Plugin;
 use crate::error::Result;
 use crate::lanes::Lanes;
-use crate::phase::Phase;
 use crate::sampler::Draws;
 use crate::texture::Palettes;
 
@@ -34,16 +33,8 @@ impl<C: ColorModel> Homogeneous<C> {
 }
 
 impl<C: ColorModel> Matter<C> for Homogeneous<C> {
-    fn phase(&self) -> &Phase {
-        &self.common.phase
-    }
-
-    fn emits(&self) -> bool {
-        self.common.emission.is_some()
-    }
-
-    fn samples_emitters(&self) -> bool {
-        self.common.sample_emitters
+    fn common(&self) -> &Common<C> {
+        &self.common
     }
 }
 

@@ -22,12 +22,8 @@ use crate::texture::volume::Volume;
 
 /// What every medium does.
 pub trait Matter<C: ColorModel>: std::fmt::Debug + Send + Sync {
-    /// How it scatters.
-    fn phase(&self) -> &Phase;
-    /// Whether it gives light.
-    fn emits(&self) -> bool;
-    /// Whether lights are sampled where it scatters.
-    fn samples_emitters(&self) -> bool;
+    /// What it has like all others.
+    fn common(&self) -> &Common<C>;
 }
 
 /// Rays through a medium.
@@ -146,6 +142,21 @@ impl<C: ColorModel, F: Lanes> Visitor<C> for Transmit<'_, C, F> {
 }
 
 impl<C: ColorModel> Medium<C> {
+    /// How it scatters.
+    pub fn phase(&self) -> &Phase {
+        &self.common().phase
+    }
+
+    /// Whether it gives light.
+    pub fn emits(&self) -> bool {
+        self.common().emission.is_some()
+    }
+
+    /// Whether lights are sampled where it scatters.
+    pub fn samples_emitters(&self) -> bool {
+        self.common().sample_emitters
+    }
+
     /// Draws how far light goes along rays: `first` is the random number of the first distance, `draws` gives all others.
     #[inline(always)]
     pub fn fly<F: Lanes>(
@@ -167,7 +178,7 @@ impl<C: ColorModel> Medium<C> {
 
 /// What both media have.
 #[derive(Clone, Debug)]
-struct Common<C: ColorModel> {
+pub struct Common<C: ColorModel> {
     /// Extinction per scene unit, before it is scaled.
     sigma_t: Volume<C>,
     /// The share of extinction that is scattering.

@@ -5,6 +5,7 @@ use glam::Vec3;
 
 use super::*;
 use crate::description::{Description, Options, Value};
+use crate::image::vol::{Grid, encode};
 
 /// A member with what it needs; `FOLDER` has a grid of matrices.
 const EXAMPLES: &[(&str, &str)] = &[
@@ -31,16 +32,13 @@ const EXAMPLES: &[(&str, &str)] = &[
 
 /// A grid of one cell: the matrix of an ellipsoid that stands askew.
 fn write_matrix(folder: &Path) {
-    let mut file = b"VOL\x03".to_vec();
-    for word in [1_u32, 1, 1, 1, 6] {
-        file.extend(word.to_le_bytes());
-    }
-    for number in [
-        0.0_f32, 0.0, 0.0, 1.0, 1.0, 1.0, 0.6, 0.3, 0.9, 0.1, -0.2, 0.15,
-    ] {
-        file.extend(number.to_le_bytes());
-    }
-    std::fs::write(folder.join("s.vol"), file).unwrap();
+    let grid = Grid {
+        size: [1; 3],
+        channels: 6,
+        bbox: [Vec3::ZERO, Vec3::ONE],
+        values: vec![0.6, 0.3, 0.9, 0.1, -0.2, 0.15],
+    };
+    std::fs::write(folder.join("s.vol"), encode(&grid)).unwrap();
 }
 
 fn phase(folder: &Path, name: &str, inside: &str) -> Phase {

@@ -441,12 +441,12 @@ mod tests {
         std::fs::write(path("m.obj"), mesh).unwrap();
         let image = crate::image::Image::new(4, 3, ["R", "G", "B"].map(String::from).to_vec());
         crate::image::write(&path("i.exr"), &image, &Default::default()).unwrap();
-        let words = [1_u32, 2, 2, 2, 1].map(u32::to_le_bytes).concat();
-        let numbers = [
-            0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.5, 0.5, 0.5, -0.5_f32,
-        ];
-        let numbers = numbers.map(f32::to_le_bytes).concat();
-        let grid = [&b"VOL\x03"[..], &words, &numbers].concat();
+        let grid = crate::image::vol::encode(&crate::image::vol::Grid {
+            size: [2; 3],
+            channels: 1,
+            bbox: [glam::Vec3::ZERO, glam::Vec3::ONE],
+            values: vec![1.0, 1.0, 1.0, 1.0, 0.5, 0.5, 0.5, -0.5],
+        });
         std::fs::write(path("g.vol"), grid).unwrap();
         std::fs::write(path("c.txt"), "0 0 0 1\n1 0 0 1\n2 0 0 1\n3 0 0 1\n").unwrap();
         let columns = [

@@ -350,14 +350,12 @@ fn make<C: ColorModel>(
     ask: &Ask<'_>,
     given: Option<ReadMesh>,
     color: C,
-    (
-        view,
-        Share {
-            film,
-            rays,
-            shutter,
-        },
-    ): (Option<&View<C>>, Share),
+    view: Option<&View<C>>,
+    Share {
+        film,
+        rays,
+        shutter,
+    }: Share,
 ) -> Result<(Scene<C>, Facts, Seconds)> {
     let Ask {
         description,
@@ -481,7 +479,7 @@ pub(super) fn prepare<'k, C: ColorModel>(ask: &'k mut Ask<'_>, color: C) -> Resu
         ask.shelf.kept = None;
         let others = sensor.map(|sensor| others::<C>(description, sensor));
         let others = others.and_then(|others| problems.take(others));
-        let made = problems.take(make(ask, given, color, (view.as_ref(), share)));
+        let made = problems.take(make(ask, given, color, view.as_ref(), share));
         ask.shelf.kept = made.map(|(scene, mut facts, spent)| {
             facts.warnings.extend(others.unwrap_or_default());
             Kept {

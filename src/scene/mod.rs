@@ -168,7 +168,7 @@ impl<C: ColorModel> Scene<C> {
 
     /// Whether the surface that was hit, if any, is a light.
     pub fn gives_light(&self, hit: &Hit) -> bool {
-        !hit.is_miss() && self.surfacing[hit.shape as usize].light.is_some()
+        !hit.is_miss() && self.shines(hit.shape)
     }
 
     /// Whether there is light all around.
@@ -199,7 +199,7 @@ impl<C: ColorModel> Scene<C> {
 
     /// The material of the surface that was hit.
     pub fn material_of(&self, hit: &Hit) -> MaterialId {
-        self.surfacing[hit.shape as usize].material
+        self.made_of(hit.shape)
     }
 
     /// What a shape is made of.
@@ -219,7 +219,7 @@ impl<C: ColorModel> Scene<C> {
 
     /// Whether light may go straight on through the surface that was hit as if nothing were there.
     pub fn passes(&self, hit: &Hit) -> bool {
-        self.has_passages && self.materials[self.material_of(hit).index()].passes()
+        self.has_passages && self.material_at(self.material_of(hit).index()).passes()
     }
 
     /// Whether there is any such surface.

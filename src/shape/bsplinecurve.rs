@@ -5,10 +5,10 @@
 //! A hit is found by going from cone to cone along the curve (Reshetov and Luebke, *Phantom Ray-Hair Intersector*,
 //! 2018), in pieces that are nearly straight and in double precision.
 
-use glam::{DMat4, DVec3, DVec4, Vec2, Vec3};
+use glam::{DMat4, DVec3, DVec4};
 
 use super::curves::{Basis, Curves, OnTube, around_balls, read};
-use super::{Bounds, Geometry, Shape, Surface, SurfaceSample};
+use super::{Bounds, Geometry, Shape, Surface};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, file};
 use crate::error::Result;
@@ -333,22 +333,6 @@ impl Surface for BsplineCurves {
             u: hit.u,
         };
         self.curves.interaction(ray, hit, &on_tube)
-    }
-
-    fn area(&self) -> f64 {
-        f64::INFINITY
-    }
-
-    fn sample(&self, _from: Vec3, _u: Vec2) -> Option<SurfaceSample> {
-        None
-    }
-
-    fn uv(&self, _point: &SurfaceSample) -> Vec2 {
-        Vec2::ZERO
-    }
-
-    fn pdf(&self, _from: Vec3, _at: &Interaction<'_>) -> f32 {
-        0.0
     }
 
     fn bytes(&self) -> usize {

@@ -7,7 +7,7 @@ mod shell;
 
 use glam::{DAffine3, DMat3, DMat4, DQuat, DVec3, Vec2, Vec3};
 
-use super::{Bounds, Geometry, Shape, Surface, SurfaceSample, to_world};
+use super::{Bounds, Geometry, Shape, Surface, to_world};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, Row, boolean, choice, file, float};
 use crate::error::Result;
@@ -249,22 +249,6 @@ impl Surface for Ellipsoids {
             mesh: None,
             barycentric: Vec2::ZERO,
         }
-    }
-
-    fn area(&self) -> f64 {
-        f64::INFINITY
-    }
-
-    fn sample(&self, _from: Vec3, _u: Vec2) -> Option<SurfaceSample> {
-        None
-    }
-
-    fn uv(&self, _point: &SurfaceSample) -> Vec2 {
-        Vec2::ZERO
-    }
-
-    fn pdf(&self, _from: Vec3, _at: &Interaction<'_>) -> f32 {
-        0.0
     }
 
     fn bytes(&self) -> usize {

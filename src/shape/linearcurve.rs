@@ -4,10 +4,10 @@
 //! the outside is met, and nothing of a segment that is inside its neighbours. Texture coordinates are the angle around
 //! the line and the place along all curves.
 
-use glam::{DMat4, DVec3, DVec4, Vec2, Vec3};
+use glam::{DMat4, DVec3, DVec4};
 
 use super::curves::{Basis, Curves, OnTube, around_balls, read};
-use super::{Bounds, Geometry, Shape, Surface, SurfaceSample};
+use super::{Bounds, Geometry, Shape, Surface};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, file};
 use crate::error::Result;
@@ -194,22 +194,6 @@ impl Surface for LinearCurves {
             u: hit.u,
         };
         self.curves.interaction(ray, hit, &on_tube)
-    }
-
-    fn area(&self) -> f64 {
-        f64::INFINITY
-    }
-
-    fn sample(&self, _from: Vec3, _u: Vec2) -> Option<SurfaceSample> {
-        None
-    }
-
-    fn uv(&self, _point: &SurfaceSample) -> Vec2 {
-        Vec2::ZERO
-    }
-
-    fn pdf(&self, _from: Vec3, _at: &Interaction<'_>) -> f32 {
-        0.0
     }
 
     fn bytes(&self) -> usize {

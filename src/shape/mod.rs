@@ -115,15 +115,23 @@ pub trait Surface: std::fmt::Debug + Send + Sync {
     fn intersect(&self, primitive: u32, ray: &Ray) -> Option<(f32, f32, f32)>;
     /// What a hit looks like; `hit` came from this surface and `ray`.
     fn interaction(&self, ray: &Ray, hit: &Hit) -> Interaction<'_>;
-    /// In square units of the scene; infinite where no light may come from it.
-    fn area(&self) -> f64;
+    /// In square units of the scene; infinite where no light may come from it, as is said of one that does not say it.
+    fn area(&self) -> f64 {
+        f64::INFINITY
+    }
     /// A point drawn on the surface for light at `from`; `None` where none can be.
-    fn sample(&self, from: Vec3, u: Vec2) -> Option<SurfaceSample>;
+    fn sample(&self, _from: Vec3, _u: Vec2) -> Option<SurfaceSample> {
+        None
+    }
     /// The texture coordinates of a point that was drawn: few ask for them, and a sphere's take long.
-    fn uv(&self, point: &SurfaceSample) -> Vec2;
+    fn uv(&self, _point: &SurfaceSample) -> Vec2 {
+        Vec2::ZERO
+    }
     /// The density with which [`Surface::sample`] would have drawn the point `at`, which is visible
     /// from `from`.
-    fn pdf(&self, from: Vec3, at: &Interaction<'_>) -> f32;
+    fn pdf(&self, _from: Vec3, _at: &Interaction<'_>) -> f32 {
+        0.0
+    }
     /// The place with these parameters, of a surface that is covered by one square of them.
     fn chart(&self, _parameters: Vec2) -> Option<Chart> {
         None

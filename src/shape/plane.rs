@@ -104,21 +104,9 @@ impl Surface for Plane {
         }
     }
 
-    fn area(&self) -> f64 {
-        f64::INFINITY
-    }
-
     fn uv(&self, point: &SurfaceSample) -> Vec2 {
         let p = self.to_local.transform_point3(point.position.as_dvec3());
         (0.5 * (p.truncate() + 1.0)).as_vec2()
-    }
-
-    fn sample(&self, _from: Vec3, _u: Vec2) -> Option<SurfaceSample> {
-        None
-    }
-
-    fn pdf(&self, _from: Vec3, _at: &Interaction<'_>) -> f32 {
-        0.0
     }
 
     fn bytes(&self) -> usize {

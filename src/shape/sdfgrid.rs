@@ -7,7 +7,7 @@
 
 use glam::{DAffine3, DMat4, DVec3, UVec3, Vec2, Vec3};
 
-use super::{Bounds, Geometry, Shape, Surface, SurfaceSample, rounding, to_world};
+use super::{Bounds, Geometry, Shape, Surface, rounding, to_world};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, choice, file};
 use crate::error::Result;
@@ -415,22 +415,6 @@ impl Surface for SdfGrid {
             mesh: None,
             barycentric: Vec2::ZERO,
         }
-    }
-
-    fn area(&self) -> f64 {
-        f64::INFINITY
-    }
-
-    fn sample(&self, _from: Vec3, _u: Vec2) -> Option<SurfaceSample> {
-        None
-    }
-
-    fn uv(&self, _point: &SurfaceSample) -> Vec2 {
-        Vec2::ZERO
-    }
-
-    fn pdf(&self, _from: Vec3, _at: &Interaction<'_>) -> f32 {
-        0.0
     }
 
     fn bytes(&self) -> usize {

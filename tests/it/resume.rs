@@ -8,6 +8,7 @@ use std::time::{Duration, Instant, SystemTime};
 
 use etendue::budget::Budget;
 use etendue::description::declared::Takes;
+use etendue::image::vol::Grid;
 use etendue::image::{self, Image};
 use serde_json::Value;
 
@@ -269,13 +270,13 @@ fn scene_of_files(place: &Place) -> Vec<(&'static str, Vec<u8>)> {
         [&[0x1c, 4, 4, 0][..], &stream, &[0; 8], &1_u32.to_le_bytes()].concat()
     };
     // Eight values on a grid.
-    let grid = |last: f32| -> Vec<u8> {
-        let words = [1_u32, 2, 2, 2, 1].map(u32::to_le_bytes).concat();
-        let numbers = [
-            0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.5, 0.5, 0.5, last,
-        ];
-        let numbers = numbers.map(f32::to_le_bytes).concat();
-        [&b"VOL\x03"[..], &words, &numbers].concat()
+    let grid = |last: f32| {
+        etendue::image::vol::encode(&Grid {
+            size: [2; 3],
+            channels: 1,
+            bbox: [glam::Vec3::ZERO, glam::Vec3::ONE],
+            values: vec![1.0, 1.0, 1.0, 1.0, 0.5, 0.5, 0.5, last],
+        })
     };
     // A tensor file: what each field is and where, then their numbers.
     let measured = |last: f32| -> Vec<u8> {

@@ -1,17 +1,16 @@
 //! How far paths get in their media, and what they do where they are scattered there: light is asked for, and the phase
 //! function turns them.
 
-use super::surfaces::scattered;
-use super::{Carried, FLIGHT, FLIGHT_DRAWS, LIGHT, Mean, Path, Segment, WAY, over};
+use super::{Carried, FLIGHT, FLIGHT_DRAWS, LIGHT, Mean, Path, Segment, WAY, over, way};
 use crate::color::{ColorModel, Spectra, Spectral as _};
 use crate::integrator::Estimate;
+use crate::integrator::arrival::Scattered;
 use crate::integrator::bounce::Decisions;
-use crate::integrator::limits::{self, Limits};
+use crate::integrator::limits::Limits;
 use crate::integrator::runs::Runs;
 use crate::integrator::wave::{Outcome, WithRays};
 use crate::interaction::{Hit, Interaction, Points, Ray, Source};
-use crate::lanes::{Frame, Ints as _, Lanes, MAX_LANES, Mask as _, Task, Vec2, Vec3};
-use crate::medium::Way;
+use crate::lanes::{Frame, Lanes, MAX_LANES, Mask as _, Task, Vec2, Vec3};
 use crate::mesh::Mesh;
 use crate::sampler::{Sampler, Streams};
 use crate::scene::Scene;
@@ -27,22 +26,15 @@ pub(super) struct Round<'a, C: ColorModel> {
     pub(super) paths: &'a mut WithRays<Path<C>>,
     pub(super) hits: &'a [Hit],
     pub(super) out: Outcome<'a, C, Segment<C>, Carried<C::Sample>>,
-    /// Of each path, whether it does not get there.
-    pub(super) stopped: &'a mut [bool],
+    /// Of each path, whether it does.
+    pub(super) gets_there: &'a mut [bool],
     pub(super) estimates: &'a mut [Estimate<C::Sample>],
 }
 
-/// Lets paths that are in media fly.
-pub(super) fn fly<C: ColorModel>(round: Round<'_, C>) {
-    let mut runs = Runs::new(round.scene.medium_count());
-    let media = round.paths.things.iter().map(|path| path.media.medium);
-    runs.sort(media.map(|medium| medium.map(|medium| medium.index())));
-    C::run(round.scene.tracer().kernel(), Flights { round, runs });
-}
-
+/// Paths in media, sorted by these.
 struct Flights<'a, C: ColorModel> {
     round: Round<'a, C>,
-    runs: Runs,
+    runs: &'a Runs,
 }
 
 impl<C: ColorModel> Task for Flights<'_, C> {
@@ -92,6 +84,14 @@ impl Source for Inside<'_> {
 }
 
 impl<C: ColorModel> Round<'_, C> {
+    /// Lets paths that are in media fly.
+    pub(super) fn fly(self, runs: &mut Runs) {
+        let media = self.paths.things.iter().map(|path| path.media.medium);
+        runs.sort(media.map(|medium| medium.map(|medium| medium.index())));
+        let kernel = self.scene.tracer().kernel();
+        C::run(kernel, Flights { round: self, runs });
+    }
+
     /// Paths in one medium.
     #[inline(always)]
     fn block<F: Lanes>(&mut self, medium: usize, indices: &[u32]) {
@@ -99,27 +99,13 @@ impl<C: ColorModel> Round<'_, C> {
         let some = &self.paths.things[indices[0] as usize];
         let mut wavelengths = [some.wavelengths; MAX_LANES];
         let mut streams = [some.stream; MAX_LANES];
-        let (mut origins, mut directions) = ([F::ROW; 3], [F::ROW; 3]);
-        let (mut ends, mut heroes) = (F::ROW, <F::Int as crate::lanes::Ints>::ROW);
         for (lane, index) in indices.iter().enumerate() {
-            let index = *index as usize;
-            let (path, ray) = (&self.paths.things[index], &self.paths.rays[index]);
+            let path = &self.paths.things[*index as usize];
             (wavelengths[lane], streams[lane]) = (path.wavelengths, path.stream);
-            for axis in 0..3 {
-                origins[axis][lane] = ray.origin[axis];
-                directions[axis][lane] = ray.direction[axis];
-            }
-            (ends[lane], heroes[lane]) = (self.hits[index].t, path.media.hero);
         }
         let streams = Streams::of(&streams[..indices.len()]);
-        let way = Way {
-            active: F::Mask::from_bits(!(u32::MAX << indices.len())),
-            origin: Vec3::<F>::load(&origins),
-            direction: Vec3::<F>::load(&directions),
-            end: F::load(&ends),
-            hero: F::Int::load(&heroes),
-            wavelengths: &wavelengths,
-        };
+        let hero = |index: usize| self.paths.things[index].media.hero;
+        let way = way::<C, F>(&self.paths.rays, self.hits, indices, hero, &wavelengths);
         let numbers = Decisions::new(self.sampler, streams, self.first, FLIGHT);
         let draws = streams.draws(self.first + FLIGHT_DRAWS);
         let flight = medium.fly(&way, numbers.u1(), draws);
@@ -142,17 +128,17 @@ impl<C: ColorModel> Round<'_, C> {
             path.media.density *= C::Columns::<F>::of::<C::Sample>(&densities, lane);
             path.media.asked = path.media.asked * asked[lane];
         }
-        let mut goes_on = flight.scattered;
+        let (mut ended, mut plays) = (0_u32, 0_u32);
         for lane in flight.scattered.lanes() {
             let index = indices[lane] as usize;
             let path = &mut self.paths.things[index];
-            self.stopped[index] = true;
+            self.gets_there[index] = false;
             self.estimates[path.slot as usize].alpha = 1.0;
+            plays |= u32::from(self.limits.plays(path.media.depth)) << lane;
             path.media.depth += 1;
-            if path.media.depth >= self.limits.max_depth {
-                goes_on = goes_on & !F::Mask::from_bits(1 << lane);
-            }
+            ended |= u32::from(path.media.depth >= self.limits.max_depth) << lane;
         }
+        let goes_on = flight.scattered & !F::Mask::from_bits(ended);
         if !goes_on.any() {
             return;
         }
@@ -224,19 +210,12 @@ impl<C: ColorModel> Round<'_, C> {
             Some(index) => self.paths.things[*index as usize].media.density,
             None => C::Sample::zero(),
         });
-        let mut plays = 0_u32;
-        for lane in goes_on.lanes() {
-            let depth = self.paths.things[indices[lane] as usize].media.depth;
-            plays |= u32::from(self.limits.plays(depth - 1)) << lane;
-        }
         let plays = F::Mask::from_bits(plays);
-        let mut lives = goes_on & F::zero().lt(sample.pdf) & !throughput.is_black();
-        let survival = limits::survival(
-            throughput * (F::one() / self.mean.lanes(densities)),
-            F::one(),
-        );
-        lives = lives & (!plays | numbers.survival().lt(survival));
-        let throughput = throughput * F::select(plays, F::one() / survival, F::one());
+        let lives = goes_on & F::zero().lt(sample.pdf) & !throughput.is_black();
+        let (survives, throughput) =
+            self.mean
+                .roulette(plays, throughput, densities, F::one(), &numbers);
+        let lives = lives & survives;
         let throughputs = throughput.rows();
         let (places, directions) = (at.position.rows(), sample.wo.rows());
         let pdfs = sample.pdf.row();
@@ -252,10 +231,11 @@ impl<C: ColorModel> Round<'_, C> {
             };
             let path = Path::<C> {
                 throughput: C::Columns::<F>::of(&throughputs, lane),
-                scattered: match medium.samples_emitters() {
-                    true => scattered(place, pdfs[lane]),
-                    false => None,
-                },
+                scattered: medium.samples_emitters().then(|| Scattered {
+                    from: place,
+                    pdf: pdfs[lane],
+                    light_share: 1.0,
+                }),
                 media: Carried {
                     asked: over(before.media.density, pdfs[lane]),
                     ..before.media

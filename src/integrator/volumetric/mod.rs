@@ -11,13 +11,17 @@ mod flights;
 mod segments;
 mod surfaces;
 
-use super::bounce::Bounces;
-use super::limits::Limits;
+use super::bounce::{Bounces, Decisions};
+use super::limits::{self, Limits};
+use super::runs::Runs;
 use super::wave::{Outcome, Walker, Wave};
-use super::{Cost, Estimates, Start};
+use super::{Context, Cost, Estimates, Start};
 use crate::color::{ColorModel, Spectra, Spectral};
-use crate::description::NodeId;
-use crate::lanes::Lanes;
+use crate::description::{NodeId, Properties};
+use crate::error::Result;
+use crate::interaction::{Hit, Ray};
+use crate::lanes::{Ints, Lanes, Mask as _, Vec3};
+use crate::medium::Way;
 use crate::sampler::Sampler;
 use crate::scene::{MediumId, Scene};
 
@@ -88,6 +92,26 @@ impl Mean {
         }
         sum * F::splat(self.share)
     }
+
+    /// Roulette for those paths that play, of these densities: which live on, and with which throughputs.
+    #[inline(always)]
+    fn roulette<F: Lanes, S: Spectra<F>>(
+        self,
+        plays: F::Mask,
+        throughput: S,
+        densities: S,
+        eta: F,
+        decision: &Decisions<'_, F>,
+    ) -> (F::Mask, S) {
+        if !plays.any() {
+            return (F::Mask::splat(true), throughput);
+        }
+        let density = self.lanes(densities);
+        let survival = limits::survival(throughput * (F::one() / density), eta);
+        let lives = !plays | decision.survival().lt(survival);
+        let grown = throughput * F::select(plays, F::one() / survival, F::one());
+        (lives, grown)
+    }
 }
 
 /// A value over a density; 0 where that is none.
@@ -98,10 +122,49 @@ fn over<S: Spectral>(value: S, density: f32) -> S {
     }
 }
 
+/// Some of the rays, on their way to what they hit, through one medium.
+#[inline(always)]
+fn way<'a, C: ColorModel, F: Lanes>(
+    rays: &[Ray],
+    hits: &[Hit],
+    indices: &[u32],
+    hero: impl Fn(usize) -> u32,
+    wavelengths: &'a [C::Wavelengths],
+) -> Way<'a, C, F> {
+    let (mut origins, mut directions) = ([F::ROW; 3], [F::ROW; 3]);
+    let (mut ends, mut heroes) = (F::ROW, F::Int::ROW);
+    for (lane, index) in indices.iter().enumerate() {
+        let index = *index as usize;
+        let ray = &rays[index];
+        for axis in 0..3 {
+            origins[axis][lane] = ray.origin[axis];
+            directions[axis][lane] = ray.direction[axis];
+        }
+        (ends[lane], heroes[lane]) = (hits[index].t, hero(index));
+    }
+    Way {
+        active: F::Mask::from_bits(!(u32::MAX << indices.len())),
+        origin: Vec3::<F>::load(&origins),
+        direction: Vec3::<F>::load(&directions),
+        end: F::load(&ends),
+        hero: F::Int::load(&heroes),
+        wavelengths,
+    }
+}
+
 /// A path of this integrator.
 type Path<C> = Walker<C, Carried<<C as ColorModel>::Sample>>;
 
 impl Volumetric {
+    /// What both plugins read.
+    pub(super) fn build(properties: &Properties<'_>, context: &Context) -> Result<Self> {
+        Ok(Self {
+            limits: Limits::build(properties)?,
+            hide_emitters: properties.boolean("hide_emitters")?,
+            medium: context.medium,
+        })
+    }
+
     /// See [`super::Estimator::estimate`].
     pub(super) fn estimate<C: ColorModel>(
         &self,
@@ -132,7 +195,7 @@ impl Volumetric {
             asked: unit,
         });
         let mut segments = Segments::new(scene);
-        let mut stopped = Vec::new();
+        let (mut media, mut gets_there) = (Runs::new(scene.medium_count()), Vec::new());
         for round in 0.. {
             let Some(first) = ROUNDS.first(round) else {
                 break;
@@ -143,8 +206,8 @@ impl Volumetric {
             let seen = |carried: &Carried<C::Sample>| carried.depth == 0;
             wave.trace_looking(round, self.hide_emitters, seen, cost);
             if scene.medium_count() > 0 {
-                wave.before(&mut stopped, |paths, hits, out, stopped| {
-                    flights::fly(flights::Round {
+                wave.before(&mut gets_there, |paths, hits, out, gets_there| {
+                    let round = flights::Round {
                         scene,
                         sampler,
                         limits: &self.limits,
@@ -156,9 +219,10 @@ impl Volumetric {
                             shadows: &mut *out.shadows,
                             next: out.next,
                         },
-                        stopped,
+                        gets_there,
                         estimates,
-                    });
+                    };
+                    round.fly(&mut media);
                     segments.settle(first, out.shadows, mean, estimates, cost);
                     out.shadows.clear();
                 });

@@ -1,15 +1,14 @@
 //! Light on its way to where it was asked for: along a shadow ray through media and through surfaces that let it pass,
 //! until it is there or something stands in the way.
 
-use super::{Mean, Path, SEGMENT_DRAWS, over};
+use super::{Mean, Path, SEGMENT_DRAWS, over, way};
 use crate::accel::Met;
 use crate::color::{ColorModel, Spectra, Spectral};
 use crate::integrator::runs::Runs;
-use crate::integrator::wave::WithRays;
+use crate::integrator::wave::{WithRays, keep};
 use crate::integrator::{Cost, Estimate};
 use crate::interaction::{Hit, Ray};
-use crate::lanes::{Ints as _, Lanes, MAX_LANES, Mask as _, Task, Vec3};
-use crate::medium::Way;
+use crate::lanes::{Lanes, MAX_LANES, Task, Vec3};
 use crate::sampler::{Stream, Streams};
 use crate::scene::{MediumId, Scene};
 
@@ -65,6 +64,8 @@ pub(super) struct Segments<'a, C: ColorModel> {
     scene: &'a Scene<C>,
     hits: Vec<Hit>,
     blocked: Vec<bool>,
+    /// Which segments go on.
+    kept: Vec<bool>,
     media: Runs,
     materials: Runs,
 }
@@ -75,6 +76,7 @@ impl<'a, C: ColorModel> Segments<'a, C> {
             scene,
             hits: Vec::new(),
             blocked: Vec::new(),
+            kept: Vec::new(),
             media: Runs::new(scene.medium_count()),
             materials: Runs::new(scene.material_count()),
         }
@@ -95,20 +97,20 @@ impl<'a, C: ColorModel> Segments<'a, C> {
                 return;
             }
             self.hits.clear();
+            self.kept.clear();
             if scene.has_passages() {
                 cost.segments(scene, &asked.rays, &mut self.hits);
-                let mut open = self
-                    .hits
-                    .iter()
-                    .map(|hit| hit.is_miss() || scene.passes(hit));
-                retain(asked, || open.next());
-                self.hits.retain(|hit| hit.is_miss() || scene.passes(hit));
+                let open = |hit: &Hit| hit.is_miss() || scene.passes(hit);
+                self.kept.extend(self.hits.iter().map(open));
+                keep(&mut self.hits, &self.kept);
+                asked.keep(&self.kept);
             } else {
                 cost.occluded(scene, &asked.rays, &mut self.blocked);
-                let mut open = self.blocked.iter().map(|blocked| !blocked);
-                retain(asked, || open.next());
-                self.hits
-                    .extend(asked.rays.iter().map(|ray| Hit::miss(ray.t_max)));
+                self.kept
+                    .extend(self.blocked.iter().map(|blocked| !blocked));
+                asked.keep(&self.kept);
+                let through = asked.rays.iter().map(|ray| Hit::miss(ray.t_max));
+                self.hits.extend(through);
             }
             let media = asked.things.iter().map(|segment| segment.medium);
             self.media
@@ -143,25 +145,13 @@ impl<'a, C: ColorModel> Segments<'a, C> {
                 asked,
             };
             C::run(scene.tracer().kernel(), pass);
-            let goes_on = asked.things.iter().zip(&self.hits);
-            let goes_on: Vec<bool> = goes_on
-                .map(|(segment, hit)| !hit.is_miss() && !segment.value.is_black())
-                .collect();
-            let mut kept = goes_on.iter().copied();
-            retain(asked, || kept.next());
+            let both = asked.things.iter().zip(&self.hits);
+            let goes_on = both.map(|(segment, hit)| !hit.is_miss() && !segment.value.is_black());
+            self.kept.clear();
+            self.kept.extend(goes_on);
+            asked.keep(&self.kept);
         }
     }
-}
-
-/// Keeps those segments of which `keep`, asked for each in turn, says so.
-fn retain<T>(asked: &mut WithRays<T>, mut keep: impl FnMut() -> Option<bool>) {
-    let kept: Vec<bool> = (0..asked.things.len())
-        .map(|_| keep() == Some(true))
-        .collect();
-    let mut each = kept.iter();
-    asked.rays.retain(|_| each.next() == Some(&true));
-    let mut each = kept.iter();
-    asked.things.retain(|_| each.next() == Some(&true));
 }
 
 /// Multiplies by what media let through on the way to what is met.
@@ -188,26 +178,12 @@ impl<C: ColorModel> Task for Thin<'_, C> {
             ([some.wavelengths; MAX_LANES], [some.stream; MAX_LANES]);
         for (medium, run) in self.runs.part(0..self.runs.count()) {
             for indices in run.chunks(F::WIDTH) {
-                let (mut origins, mut directions) = ([F::ROW; 3], [F::ROW; 3]);
-                let (mut ends, mut heroes) = (F::ROW, <F::Int as crate::lanes::Ints>::ROW);
                 for (lane, index) in indices.iter().enumerate() {
-                    let index = *index as usize;
-                    let (segment, ray) = (&things[index], &rays[index]);
+                    let segment = &things[*index as usize];
                     (wavelengths[lane], streams[lane]) = (segment.wavelengths, segment.stream);
-                    for axis in 0..3 {
-                        origins[axis][lane] = ray.origin[axis];
-                        directions[axis][lane] = ray.direction[axis];
-                    }
-                    (ends[lane], heroes[lane]) = (self.hits[index].t, segment.hero);
                 }
-                let way = Way {
-                    active: F::Mask::from_bits(!(u32::MAX << indices.len())),
-                    origin: Vec3::<F>::load(&origins),
-                    direction: Vec3::<F>::load(&directions),
-                    end: F::load(&ends),
-                    hero: F::Int::load(&heroes),
-                    wavelengths: &wavelengths,
-                };
+                let hero = |index: usize| things[index].hero;
+                let way = way::<C, F>(rays, self.hits, indices, hero, &wavelengths);
                 let streams = Streams::<F>::of(&streams[..indices.len()]);
                 let draws = streams.draws(self.dimension).part(self.part);
                 let through = self.scene.medium_at(medium).transmit(&way, draws);
@@ -256,14 +232,7 @@ impl<C: ColorModel> Task for Pass<'_, C> {
                 let material = self.scene.material_at(material);
                 let through = material.passing_lanes(&at, at.wi, &wavelengths);
                 let (values, probabilities) = (through.value.rows(), through.pdf.row());
-                let mut directions = [F::ROW; 3];
-                for (lane, index) in indices.iter().enumerate() {
-                    let direction = rays[*index as usize].direction.to_array();
-                    for (row, value) in directions.iter_mut().zip(direction) {
-                        row[lane] = value;
-                    }
-                }
-                let origins = at.origin(Vec3::<F>::load(&directions)).rows();
+                let origins = at.origin(met.directions()).rows();
                 let normals = at.normal.rows();
                 for (lane, index) in indices.iter().enumerate() {
                     let index = *index as usize;

@@ -1,10 +1,9 @@
 //! What paths do at surfaces: light is asked for, and they go on, through boundaries of media also into another one.
 
 use super::{Carried, LIGHT, Mean, Path, Segment, WAY, over};
-use crate::color::{ColorModel, Spectra};
+use crate::color::{ColorModel, Spectra, Spectral as _};
 use crate::integrator::Estimate;
-use crate::integrator::arrival::Scattered;
-use crate::integrator::limits::{self, Limits};
+use crate::integrator::limits::Limits;
 use crate::integrator::wave::{Block, Outcome, Shading, Ways};
 use crate::lanes::{Lanes, Mask as _, Vec3};
 
@@ -41,12 +40,8 @@ impl<C: ColorModel> Surfaces<'_, C> {
         let wo = at.frame.to_local(light.direction);
         let value = block.material.eval_lanes(at, at.wi, wo, w);
         let contribution = block.throughput * value.value * light.radiance;
-        let mut lit = at.active & F::zero().lt(light.pdf) & !contribution.is_black();
-        for lane in lit.lanes() {
-            if block.walker(lane).media.depth.saturating_add(1) >= self.limits.max_depth {
-                lit = lit & !F::Mask::from_bits(1 << lane);
-            }
-        }
+        let lit = at.active & F::zero().lt(light.pdf) & !contribution.is_black();
+        let lit = lit & !self.ends(block, lit);
         if !lit.any() {
             return;
         }
@@ -72,6 +67,17 @@ impl<C: ColorModel> Surfaces<'_, C> {
         });
     }
 
+    /// Of some paths those that may not become a bounce longer.
+    #[inline(always)]
+    fn ends<F: Lanes>(&self, block: &At<'_, C, F>, paths: F::Mask) -> F::Mask {
+        let mut ends = 0_u32;
+        for lane in paths.lanes() {
+            let longer = block.walker(lane).media.depth.saturating_add(1);
+            ends |= u32::from(longer >= self.limits.max_depth) << lane;
+        }
+        F::Mask::from_bits(ends)
+    }
+
     /// Turns the paths.
     #[inline(always)]
     fn way<F: Lanes>(&mut self, block: &At<'_, C, F>, out: &mut Out<'_, C>) {
@@ -83,29 +89,25 @@ impl<C: ColorModel> Surfaces<'_, C> {
             self.estimates[block.walker(lane).slot as usize].alpha = 1.0;
         }
         let eta = block.eta() * sample.eta;
-        let mut throughput = block.throughput * sample.weight;
-        let mut lives = sample.drawn & at.active & !throughput.is_black();
+        let throughput = block.throughput * sample.weight;
+        let lives = sample.drawn & at.active & !throughput.is_black();
         // Where a path is scattered, and not merely let pass, it is a bounce longer.
+        let longer = lives & !sample.null;
         let mut plays = 0_u32;
-        for lane in (lives & !sample.null).lanes() {
+        for lane in longer.lanes() {
             let depth = block.walker(lane).media.depth;
-            if depth.saturating_add(1) >= self.limits.max_depth {
-                lives = lives & !F::Mask::from_bits(1 << lane);
-            }
             plays |= u32::from(self.limits.plays(depth)) << lane;
         }
-        if plays != 0 {
-            let plays = F::Mask::from_bits(plays);
-            let densities =
-                C::Columns::<F>::from_samples(|lane| match at.active.to_bits() >> lane & 1 {
-                    0 => crate::color::Spectral::zero(),
-                    _ => block.walker(lane).media.density,
-                });
-            let density = self.mean.lanes(densities);
-            let survival = limits::survival(throughput * (F::one() / density), eta);
-            lives = lives & (!plays | numbers.survival().lt(survival));
-            throughput = throughput * F::select(plays, F::one() / survival, F::one());
-        }
+        // Whoever does not play is not looked up.
+        let densities = C::Columns::<F>::from_samples(|lane| match plays >> lane & 1 {
+            0 => C::Sample::zero(),
+            _ => block.walker(lane).media.density,
+        });
+        let plays = F::Mask::from_bits(plays);
+        let (survives, throughput) = self
+            .mean
+            .roulette(plays, throughput, densities, eta, &numbers);
+        let lives = lives & survives & !self.ends(block, longer);
         if !lives.any() {
             return;
         }
@@ -136,13 +138,4 @@ impl<C: ColorModel> Surfaces<'_, C> {
             }
         });
     }
-}
-
-/// Where a path was scattered.
-pub(super) fn scattered(from: glam::Vec3, pdf: f32) -> Option<Scattered> {
-    Some(Scattered {
-        from,
-        pdf,
-        light_share: 1.0,
-    })
 }

@@ -5,20 +5,17 @@ use glam::Vec3;
 use super::*;
 use crate::color::{Rgb, Spectral as _};
 use crate::description::{Description, Options};
+use crate::image::vol::{Grid, encode};
 
 /// A grid with these values, x fastest.
 fn write(folder: &Path, size: [u32; 3], channels: u32, values: &[f32]) {
-    let mut file = b"VOL\x03".to_vec();
-    for word in [1, size[0], size[1], size[2], channels] {
-        file.extend(word.to_le_bytes());
-    }
-    for number in [0.0_f32, 0.0, 0.0, 2.0, 4.0, 8.0] {
-        file.extend(number.to_le_bytes());
-    }
-    for number in values {
-        file.extend(number.to_le_bytes());
-    }
-    std::fs::write(folder.join("g.vol"), file).unwrap();
+    let grid = Grid {
+        size,
+        channels,
+        bbox: [Vec3::ZERO, Vec3::new(2.0, 4.0, 8.0)],
+        values: values.to_vec(),
+    };
+    std::fs::write(folder.join("g.vol"), encode(&grid)).unwrap();
 }
 
 fn volume(folder: &Path, inside: &str) -> Volume<Rgb> {
