@@ -150,7 +150,13 @@ impl<C: ColorModel> Emitter<C> for Area<C> {
         }
         let radiance = match &self.radiance {
             Texture::Uniform(radiance) => C::evaluate(radiance.value(), wavelengths),
-            texture => texture.eval(&interaction(&self.shape, &point), wavelengths),
+            texture => {
+                let at = Interaction {
+                    position: target,
+                    ..interaction(&self.shape, &point)
+                };
+                texture.eval(&at, wavelengths)
+            }
         };
         Some(LightSample {
             direction,

@@ -41,6 +41,12 @@ impl<C: ColorModel> BumpMap<C> {
             );
             return Err(properties.error("", message));
         };
+        if texture.plugin() == "volume" {
+            return Err(texture.error(
+                "",
+                "a volume does not say how heights change along a surface",
+            ));
+        }
         let bumps = Bumps {
             height: Texture::build(texture, &palettes.numbers.with_role(Role::Quantity))?,
             scale: properties.float("scale")? as f32,

@@ -224,7 +224,8 @@ fn fraction(texture: &Texture<Mono>, at: &Interaction<'_>) -> f32 {
     texture.eval(at, &())[0].clamp(0.0, 1.0)
 }
 
-/// The mean of a colour over texture coordinates and channels, by some samples: for choosing lobes.
+/// The mean of a colour over texture coordinates and channels, by some samples: for choosing lobes. One that varies and
+/// shows nothing there (a mesh's attribute, a volume elsewhere) counts as a half, so that its lobe is chosen at all.
 fn mean<C: ColorModel>(palettes: &Palettes<C>, texture: &Texture<C>) -> f32 {
     let unit = palettes.colors.color.unit();
     let total = |value: C::Sample| (0..C::Sample::LANES).map(|c| value[c]).sum::<f32>();
@@ -233,7 +234,10 @@ fn mean<C: ColorModel>(palettes: &Palettes<C>, texture: &Texture<C>) -> f32 {
         sum += total(value * unit);
         count += 1.0;
     }
-    sum / (total(unit) * count)
+    match texture.constant() {
+        None if sum == 0.0 => 0.5,
+        _ => sum / (total(unit) * count),
+    }
 }
 
 /// A texture's values at points spread over texture coordinates and wavelengths.

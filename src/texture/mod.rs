@@ -74,6 +74,7 @@ family! {
         "sellmeier" => Sellmeier(sellmeier::Sellmeier<C>),
         "srgb" => Srgb(srgb::Srgb<C>),
         "uniform" => Uniform(uniform::Uniform<C>),
+        "volume" => Volume(volume::Cut<C>),
         "zoneplate" => ZonePlate(zoneplate::ZonePlate<C>),
     }
 }
@@ -118,6 +119,7 @@ impl<C: ColorModel, F: Lanes> Call<F> for LookUp<'_, C, F> {
             Texture::Bitmap(bitmap) => bitmap.eval_lanes(at.uv, wavelengths),
             Texture::Checkerboard(board) => board.eval_lanes(at, wavelengths),
             Texture::D65(light) => light.eval_lanes(at, wavelengths),
+            Texture::Volume(volume) => volume.eval_lanes(at, wavelengths),
             other => eval_each(other, at, wavelengths),
         }
     }

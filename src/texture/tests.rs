@@ -227,7 +227,7 @@ fn every_texture<C: ColorModel>(color: &C) -> Vec<(&'static str, Texture<C>)> {
         "sellmeier" => "<string name='b' value='1.04, 0.23'/><string name='c' value='0.006, 0.02'/>".to_owned(),
         "srgb" => "<rgb name='color' value='0.2, 0.4, 0.1'/>".to_owned(),
         "zoneplate" => "<float name='rings' value='2'/>".to_owned(),
-        "cauchy" | "checkerboard" | "d65" | "glass" | "uniform" => String::new(),
+        "cauchy" | "checkerboard" | "d65" | "glass" | "uniform" | "volume" => String::new(),
         other => panic!("give {other} an example"),
     }
     };

@@ -4,8 +4,11 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use etendue::display;
+use etendue::image::vol::{Grid, encode};
 use etendue::image::{Image, Metadata};
 use etendue::render::{Options, Overrides};
+
+use glam::Vec3;
 
 use super::support::{Mean, film, image_of, meter, path, rendered, scene};
 
@@ -386,6 +389,43 @@ fn a_checkerboard_has_its_first_colour_in_the_first_quarter_and_the_last() {
             for (c, value) in expected.into_iter().enumerate() {
                 assert!((seen.get(x, y, c) - value).abs() < 1e-5, "({x}, {y})");
             }
+        }
+    }
+}
+
+#[test]
+fn a_volume_shows_on_a_surface_where_both_are() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("g.vol");
+    // 1 and 3 along x, times 1 and 2 along y: linear between the cells' centres.
+    let grid = Grid {
+        size: [2, 2, 1],
+        channels: 1,
+        bbox: [Vec3::ZERO, Vec3::ONE],
+        values: vec![1.0, 3.0, 2.0, 6.0],
+    };
+    std::fs::write(&path, encode(&grid)).expect("the folder is there");
+    let seen = glowing(&format!(
+        r#"<texture type="volume" name="radiance"><volume type="gridvolume" name="volume">
+            <string name="filename" value="{}"/>
+            <transform name="to_world"><translate x="-0.5" y="-0.5"/><scale x="4" y="4"/></transform>
+        </volume></texture>"#,
+        path.display()
+    ));
+    for y in 0..8 {
+        for x in 0..12 {
+            // The film is 2 wide, and a pixel's samples are even over it.
+            let place = [
+                (x as f32 + 0.5) / 6.0 - 1.0,
+                1.0 - (y as f32 + 0.5) / 6.0 - 1.0 / 3.0,
+            ];
+            let expected = (2.0 + place[0]) * (1.5 + 0.5 * place[1]);
+            let found = seen.get(x, y, 0);
+            // Over a pixel of a sixth the values vary by so much.
+            assert!(
+                (found - expected).abs() < 0.35,
+                "({x}, {y}): {found} {expected}"
+            );
         }
     }
 }

@@ -1,10 +1,11 @@
 //! `constvolume`: one value (1) everywhere.
 
-use super::{Bounds, Field, Placement, TO_WORLD};
+use super::field::{Field, Placement, TO_WORLD};
 use crate::color::ColorModel;
 use crate::description::Properties;
 use crate::description::declared::{Plugin, texture};
 use crate::error::Result;
+use crate::math::Bounds;
 use crate::texture::Palette;
 
 /// One value.

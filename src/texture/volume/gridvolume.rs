@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use glam::DMat4;
 
-use super::{Field, Placement, TO_WORLD, diagonal};
+use super::field::{Field, Placement, TO_WORLD, diagonal};
 use crate::color::{ColorModel, Pixels, Spectra};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, boolean, choice, file, float};
@@ -301,6 +301,10 @@ impl<C: ColorModel> Field<C> for GridVolume<C> {
 
     fn resolution(&self) -> [usize; 3] {
         self.size
+    }
+
+    fn holds_matrices(&self) -> bool {
+        matches!(*self.cells, Cells::Matrices(_))
     }
 
     fn is_grey(&self) -> bool {

@@ -3,9 +3,11 @@ use std::path::Path;
 use glam::Vec3;
 
 use super::*;
-use crate::color::{Rgb, Spectral as _};
-use crate::description::{Description, Options};
+use crate::color::{Rgb, Role, Spectral as _};
+use crate::description::{Description, Options, Value};
 use crate::image::vol::{Grid, encode};
+use crate::math::{Bounds, Frame};
+use crate::texture::Texture;
 
 /// A grid with these values, x fastest.
 fn write(folder: &Path, size: [u32; 3], channels: u32, values: &[f32]) {
@@ -118,4 +120,56 @@ fn no_value_within_a_box_is_above_its_bound() {
             }
         }
     }
+}
+
+/// The texture that shows a grid, as a reflectance.
+fn texture<C: ColorModel>(folder: &Path, color: C) -> Result<Texture<C>> {
+    let text =
+        "<scene version='3.0.0'><texture type='volume'><volume name='volume' type='gridvolume'>
+        <string name='filename' value='g.vol'/></volume></texture></scene>";
+    let scene = Description::parse(text, &folder.join("test.xml"), &Options::default()).unwrap();
+    let Value::Object(node) = scene.root().all()[0].value else {
+        panic!("the scene holds a texture");
+    };
+    Texture::build(&scene.node(node), &Palette::new(color))
+}
+
+#[test]
+fn a_surface_shows_the_volume_at_its_place_in_the_world_whatever_its_texture_coordinates() {
+    let folder = tempfile::tempdir().unwrap();
+    let values: Vec<f32> = (0..8).map(|i| 0.1 * (i + 1) as f32).collect();
+    write(folder.path(), [2; 3], 1, &values);
+    let shown = texture(folder.path(), Rgb).unwrap();
+    for (place, expected) in [
+        (Vec3::splat(0.25), 0.1),
+        (Vec3::new(0.75, 0.25, 0.25), 0.2),
+        (Vec3::new(0.25, 0.75, 0.25), 0.3),
+        (Vec3::new(0.25, 0.25, 0.75), 0.5),
+        (Vec3::splat(0.5), 0.45),
+        (Vec3::splat(9.0), 0.8),
+    ] {
+        let at = Interaction {
+            position: place,
+            frame: Frame::around(Vec3::Z),
+            ..Interaction::at_uv(glam::Vec2::new(0.9, 0.1))
+        };
+        let lanes: crate::color::Samples<3> = shown.eval_lanes(&Points::one(&at), &[()]).sample(0);
+        for value in [shown.eval(&at, &())[0], lanes[0]] {
+            assert!(
+                (value - expected).abs() < 1e-6,
+                "{place}: {value} {expected}"
+            );
+        }
+    }
+}
+
+#[test]
+fn matrices_are_numbers_by_their_mean_and_no_colours() {
+    let folder = tempfile::tempdir().unwrap();
+    write(folder.path(), [1; 3], 6, &[1.0, 2.0, 3.0, 0.0, 0.5, 1.0]);
+    let number = texture(folder.path(), Mono).unwrap();
+    let at = Interaction::at_uv(glam::Vec2::ZERO);
+    assert_eq!(number.eval(&at, &())[0], 1.25);
+    let error = texture(folder.path(), Rgb).unwrap_err().to_string();
+    assert!(error.contains("1 or 3 channels"), "{error}");
 }

@@ -1,12 +1,9 @@
 //! Volumes: colours (or numbers) that vary over space, for participating media, and the same everywhere in their simplest
 //! form. A volume stands in the unit cube, which `to_world` puts into the world.
 
-mod constvolume;
-mod gridvolume;
-
 use glam::{Affine3A, DMat4, Vec3};
 
-use super::Palette;
+use super::{constvolume, gridvolume};
 use crate::color::{ColorModel, Role, Spectra};
 use crate::description::declared::{Row, transform};
 use crate::description::{Kind, Properties, Value};
@@ -14,6 +11,7 @@ use crate::error::Result;
 use crate::family::family;
 use crate::lanes::{self, Call, Lanes};
 use crate::math::{Bounds, Transform};
+use crate::texture::Palette;
 
 /// What every volume does.
 pub trait Field<C: ColorModel>: std::fmt::Debug + Send + Sync {
@@ -26,6 +24,10 @@ pub trait Field<C: ColorModel>: std::fmt::Debug + Send + Sync {
     /// Cells along each axis of the unit cube.
     fn resolution(&self) -> [usize; 3] {
         [1; 3]
+    }
+    /// Whether the values are matrices.
+    fn holds_matrices(&self) -> bool {
+        false
     }
     /// Whether the value is the same in every channel.
     fn is_grey(&self) -> bool {
@@ -103,7 +105,7 @@ impl<C: ColorModel> Volume<C> {
 
 /// The diagonal matrices of the first three channels, or of the only one.
 #[inline(always)]
-fn diagonal<F: Lanes, S: Spectra<F>>(values: S) -> [F; 6] {
+pub(super) fn diagonal<F: Lanes, S: Spectra<F>>(values: S) -> [F; 6] {
     let last = S::CHANNELS - 1;
     let [xx, yy, zz] = [values[0], values[last.min(1)], values[last.min(2)]];
     [xx, yy, zz, F::zero(), F::zero(), F::zero()]
@@ -142,7 +144,7 @@ impl<C: ColorModel, F: Lanes> Call<F> for Matrices<'_, C, F> {
 }
 
 /// Where the unit cube stands.
-const TO_WORLD: Row = transform("to_world", "from the unit cube to the world");
+pub(super) const TO_WORLD: Row = transform("to_world", "from the unit cube to the world");
 
 const UNIT: Bounds = Bounds {
     min: Vec3::ZERO,
@@ -151,14 +153,14 @@ const UNIT: Bounds = Bounds {
 
 /// The unit cube's place in the world, and the way back.
 #[derive(Clone, Copy, Debug)]
-struct Placement {
-    bounds: Bounds,
+pub(super) struct Placement {
+    pub(super) bounds: Bounds,
     to_local: Affine3A,
 }
 
 impl Placement {
     /// Of the unit cube as it is.
-    fn identity() -> Self {
+    pub(super) fn identity() -> Self {
         Self {
             bounds: UNIT,
             to_local: Affine3A::IDENTITY,
@@ -166,7 +168,7 @@ impl Placement {
     }
 
     /// By `to_world`, of a unit cube that `inner` has put somewhere before.
-    fn of(properties: &Properties<'_>, inner: DMat4) -> Result<Self> {
+    pub(super) fn of(properties: &Properties<'_>, inner: DMat4) -> Result<Self> {
         let to_world = properties.transform("to_world")? * inner;
         let Some(transform) = Transform::new(&to_world) else {
             let message = "a volume needs a transform that can be inverted";
@@ -179,7 +181,7 @@ impl Placement {
     }
 
     /// The box, in the unit cube's space, around a box in the world.
-    fn around(&self, world: &Bounds) -> Bounds {
+    pub(super) fn around(&self, world: &Bounds) -> Bounds {
         let corner = |i: u32| {
             let side = |axis: usize| {
                 if i >> axis & 1 == 1 {
@@ -196,13 +198,10 @@ impl Placement {
 
     /// Places in the world as they stand in the unit cube.
     #[inline(always)]
-    fn local<F: Lanes>(&self, at: lanes::Vec3<F>) -> lanes::Vec3<F> {
+    pub(super) fn local<F: Lanes>(&self, at: lanes::Vec3<F>) -> lanes::Vec3<F> {
         let column = |axis: glam::Vec3A| lanes::Vec3::all(axis.into());
         let m = &self.to_local.matrix3;
         let (x, y, z) = (column(m.x_axis), column(m.y_axis), column(m.z_axis));
         x * at.x + y * at.y + z * at.z + column(self.to_local.translation)
     }
 }
-
-#[cfg(test)]
-mod tests;
