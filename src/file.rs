@@ -1,12 +1,14 @@
 //! Files that are there whole or not at all: the bytes go to a temporary file in the target's folder,
 //! reach the disk, and then take the target's name in one step. After any failure the old file, if there
-//! was one, is untouched and nothing new is left behind.
+//! was one, is untouched and nothing new is left behind; what a process that was killed has left is removed by who next
+//! writes in the folder from the same machine.
 
 pub(crate) mod text;
 
 use std::fs::{self, File};
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use tempfile::NamedTempFile;
 
@@ -54,7 +56,8 @@ pub(crate) fn leave(
 ) -> std::io::Result<()> {
     let folder = folder_of(path);
     fs::create_dir_all(folder)?;
-    let mut file = NamedTempFile::new_in(folder)?;
+    remove_stale(folder);
+    let mut file = temporary_beside(path)?;
     write(&mut file)?;
     file.persist(path)?;
     Ok(())
@@ -74,6 +77,7 @@ pub(crate) fn check_writable(path: &Path) -> Result<()> {
     let target = resolve(path)?;
     // Of folders that would be made, the one that they would be made in is tried.
     let folder = existing(folder_of(&target));
+    remove_stale(folder);
     temporary_beside(&folder.join("file"))
         .map(drop)
         .map_err(|e| Error::system("write", path, &e))
@@ -167,9 +171,48 @@ fn folder_of(path: &Path) -> &Path {
     }
 }
 
+/// As names begin on machines whose own is not known.
+const NOBODYS: &str = ".etendue--";
+
+/// What the names of this machine's temporary files begin with.
+fn prefix_of_machine() -> String {
+    let name = fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
+    let plain = name.chars().filter(char::is_ascii_alphanumeric);
+    format!(".etendue-{}-", plain.take(32).collect::<String>())
+}
+
 /// What the names of this process's temporary files begin with.
 fn temporary_prefix() -> String {
-    format!(".etendue-{}-", std::process::id())
+    format!("{}{}-", prefix_of_machine(), std::process::id())
+}
+
+/// Removes temporary files of this machine's processes that are no more: who writes one holds a lock on it, which ends
+/// with the process. Young ones stay, for theirs may be about to be locked, and so do those whose file system has no locks.
+fn remove_stale(folder: &Path) {
+    const AGE: Duration = Duration::from_secs(60);
+    let prefix = prefix_of_machine();
+    if prefix == NOBODYS {
+        return;
+    }
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        if !entry.file_name().to_string_lossy().starts_with(&prefix) {
+            continue;
+        }
+        let Ok(about) = entry.metadata() else {
+            continue;
+        };
+        let modified = about.modified().ok();
+        let age = modified
+            .and_then(|time| time.elapsed().ok())
+            .unwrap_or_default();
+        if about.is_file()
+            && age > AGE
+            && let Ok(file) = File::open(entry.path())
+            && file.try_lock_shared().is_ok()
+        {
+            let _ = fs::remove_file(entry.path());
+        }
+    }
 }
 
 /// Removes what this process has begun to write as `path` or beside it, for who is about to end the process.
@@ -198,6 +241,9 @@ fn temporary_beside(target: &Path) -> std::io::Result<NamedTempFile> {
         builder.permissions(fs::Permissions::from_mode(0o666));
     }
     let file = builder.tempfile_in(folder_of(target))?;
+    // Where there are no locks nothing is removed.
+    #[cfg(unix)]
+    let _ = file.as_file().try_lock();
     if let Ok(there) = fs::metadata(target) {
         // What takes a file's place is for the same people to read.
         file.as_file().set_permissions(there.permissions())?;
@@ -271,6 +317,41 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         check_writable(&folder.path().join("a.exr")).unwrap();
         assert!(entries(folder.path()).is_empty());
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn what_a_killed_process_has_left_is_removed_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let hour = std::time::SystemTime::now() - Duration::from_secs(3600);
+        let make = |name: &str, old: bool| {
+            let file = File::create(folder.path().join(name)).unwrap();
+            if old {
+                file.set_modified(hour).unwrap();
+            }
+            file
+        };
+        let here = prefix_of_machine();
+        let [stale, young, held] = ["1-a", "2-b", "3-c"].map(|end| format!("{here}{end}"));
+        let elsewhere = ".etendue-another-4-d".to_owned();
+        drop(make(&stale, true));
+        drop(make(&young, false));
+        let held_open = make(&held, true);
+        held_open.lock().unwrap();
+        drop(make(&elsewhere, true));
+        drop(make("a.exr", true));
+        check_writable(&folder.path().join("b.exr")).unwrap();
+        let mut left = vec!["a.exr".to_owned(), young.clone(), held.clone(), elsewhere];
+        left.sort();
+        assert_eq!(entries(folder.path()), left);
+        drop(held_open);
+        check_writable(&folder.path().join("b.exr")).unwrap();
+        assert!(!folder.path().join(held).exists());
+        // While this process writes a file, it is held.
+        let file = temporary_beside(&folder.path().join("c.exr")).unwrap();
+        file.as_file().set_modified(hour).unwrap();
+        remove_stale(folder.path());
+        assert!(file.path().exists());
     }
 
     #[test]
