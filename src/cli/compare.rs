@@ -7,12 +7,12 @@ mod two;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use etendue::compare::map::Map;
+use etendue::compare::map::{Map, Scale, robust_top};
 use etendue::compare::metric::Metric;
 use etendue::compare::pair;
-use etendue::compare::{Crop, Layer, Selection, flip};
+use etendue::compare::{Crop, Layer, Selection, flip, signed};
 use etendue::error::{Error, Result};
-use etendue::image;
+use etendue::image::{self, Image};
 use etendue::sensor::Window;
 use serde_json::{Value, json};
 
@@ -85,6 +85,10 @@ pub(super) struct Arguments {
     /// What the map of two images shows
     #[arg(long, value_enum, requires = "map", conflicts_with_all = ["a", "reference"], help_heading = TELL)]
     map_of: Option<MapOf>,
+    /// Draw where B is brighter than A (red) and where darker (blue), as PNG: (b − a) / (|a| + 1 % of its mean), by the
+    /// luminance of colours, by that of other channels which differs most
+    #[arg(long, value_name = "PNG", help_heading = TELL)]
+    signed_map: Option<PathBuf>,
     #[command(flatten)]
     memory: MemoryArguments,
     /// Print a JSON object
@@ -225,7 +229,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
 }
 
 fn compare(arguments: &Arguments) -> Result<Outcome> {
-    if let Some(map) = &arguments.map {
+    for map in [&arguments.map, &arguments.signed_map]
+        .into_iter()
+        .flatten()
+    {
         image::check_writable(map)?;
     }
     match (&arguments.reference, &arguments.images[..]) {
@@ -270,6 +277,23 @@ impl Arguments {
             values,
             label,
             top,
+            scale: Scale::FromZero,
+        };
+        image::write_codes(path, &map.draw()?, image::Tag::Srgb)
+    }
+
+    /// Draws where `b` is brighter than `a`.
+    fn draw_signed(&self, a: &Image, b: &Image, rgb: Option<[usize; 3]>) -> Result<()> {
+        let Some(path) = &self.signed_map else {
+            return Ok(());
+        };
+        let values = signed::relative(a, b, rgb)?;
+        let map = Map {
+            width: a.width() as usize,
+            values: &values,
+            label: "(b - a) / a",
+            top: robust_top(&values),
+            scale: Scale::AboutZero,
         };
         image::write_codes(path, &map.draw()?, image::Tag::Srgb)
     }

@@ -86,7 +86,8 @@ pub(super) struct Arguments {
     /// Do not judge the images, compare the times
     #[arg(long)]
     timing_only: bool,
-    /// Keep both sides' mean images and a map of the error, in a folder of DIR for each scene
+    /// Keep both sides' mean images and two maps, in a folder of DIR for each scene: error.png, how many standard errors
+    /// they are apart, and signed.png, where Étendue's is brighter (red) and where darker (blue)
     #[arg(long, value_name = "DIR", conflicts_with = "timing_only")]
     keep: Option<PathBuf>,
     /// Write DIR/index.html, a page that shows the images side by side, where they differ, and what each side took

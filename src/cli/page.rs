@@ -5,7 +5,7 @@ use std::path::Path;
 use base64::Engine as _;
 use base64::prelude::BASE64_STANDARD;
 use etendue::color::luminance;
-use etendue::compare::map::robust_top;
+use etendue::compare::map::{Scale, robust_top};
 use etendue::compare::seeds::TILE;
 use etendue::crosscheck::Pictures;
 use etendue::display::DisplayTransform;
@@ -61,6 +61,7 @@ fn pictures(pictures: &Pictures) -> Result<Value> {
         reference,
         ours,
         standard_errors,
+        brighter,
     } = pictures;
     let [width, height] = [reference.width() as usize, reference.height() as usize];
     let means = [tiles(reference), tiles(ours)];
@@ -88,6 +89,8 @@ fn pictures(pictures: &Pictures) -> Result<Value> {
         "a": address(&DisplayTransform::default().shown(reference)?)?,
         "b": address(&DisplayTransform::default().shown(ours)?)?,
         "error": address(&map(width, standard_errors)?)?,
+        "signed": address(&signed(width, brighter)?)?,
+        "signed_top": format!("{:.2} %", 100.0 * robust_top(brighter)),
         "means": means,
         "worst": named.collect::<Value>(),
     }))
@@ -126,6 +129,15 @@ fn map(width: usize, values: &[f32]) -> Result<Codes> {
     Codes::new(width as u32, height as u32, Layout::Grey, codes)
 }
 
+/// By how much pixels are brighter, from blue to red.
+fn signed(width: usize, values: &[f32]) -> Result<Codes> {
+    let top = robust_top(values);
+    let color = |v: &f32| Scale::AboutZero.color(*v, top);
+    let height = values.len() / width.max(1);
+    let codes = values.iter().flat_map(color).collect();
+    Codes::new(width as u32, height as u32, Layout::Rgb, codes)
+}
+
 /// The picture as an address that holds it.
 fn address(codes: &Codes) -> Result<String> {
     let bytes = BASE64_STANDARD.encode(codes.to_jpeg()?);
@@ -146,6 +158,7 @@ mod tests {
             reference: image(0.5),
             ours: image(0.505),
             standard_errors: vec![1.26; 20 * 17],
+            brighter: vec![0.01; 20 * 17],
         };
         let scenes = [Scene {
             name: "</script><b>",
@@ -166,5 +179,8 @@ mod tests {
         assert_eq!(scene["pictures"]["means"][1][3][0], 0.505);
         let jpeg = scene["pictures"]["a"].as_str().unwrap();
         assert!(jpeg.starts_with("data:image/jpeg;base64,/9j/"), "{jpeg}");
+        let jpeg = scene["pictures"]["signed"].as_str().unwrap();
+        assert!(jpeg.starts_with("data:image/jpeg;base64,/9j/"), "{jpeg}");
+        assert_eq!(scene["pictures"]["signed_top"], "1.00 %");
     }
 }

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use clap::{Args, ValueEnum};
 use etendue::accel::{Build, Method};
 use etendue::budget::Budget;
-use etendue::compare::map::{Map, robust_top};
+use etendue::compare::map::{Map, Scale, robust_top};
 use etendue::denoise::Denoiser;
 use etendue::description::{self, Description, Kind, Value};
 use etendue::display;
@@ -608,6 +608,7 @@ impl<'a> Series<'a> {
         }
         let map = Map {
             width: heat.width,
+            scale: Scale::FromZero,
             values: &heat.node_steps,
             label: "node steps a sample",
             top: robust_top(&heat.node_steps),

@@ -1,5 +1,6 @@
-//! Maps: one value a pixel, drawn in magma over a colour bar that says what the colours mean. Small images
-//! are enlarged in whole steps, so that the legend has room and pixels can be told apart.
+//! Maps: one value a pixel, drawn over a colour bar that says what the colours mean: in magma from 0 on, or
+//! from blue over white to red about 0. Small images are enlarged in whole steps, so that the legend has room and
+//! pixels can be told apart.
 
 use flip_rs::MAGMA;
 use font8x8::legacy::BASIC_LEGACY;
@@ -23,14 +24,36 @@ pub struct Map<'a> {
     pub values: &'a [f32],
     /// What the values are, in ASCII, such as `|b - a|`.
     pub label: &'a str,
-    /// The value that takes the brightest colour, as all above do; 0 takes the darkest.
+    /// The value that takes the last colour, as all above do.
     pub top: f32,
+    /// What the first colour stands for.
+    pub scale: Scale,
+}
+
+/// Where the colours of a [`Map`] begin.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scale {
+    /// At 0, which is black; the top is the brightest.
+    FromZero,
+    /// At minus the top, which is blue; 0 is white and the top is red.
+    AboutZero,
+}
+
+impl Scale {
+    /// The colour of `value` where the last colour stands for `top`. What is not a number takes the last colour, or
+    /// black about 0.
+    pub fn color(self, value: f32, top: f32) -> [u8; 3] {
+        match self {
+            Self::FromZero => magma(value / top),
+            Self::AboutZero => diverging(value / top),
+        }
+    }
 }
 
 /// A top for [`Map`] that a few fireflies do not raise: what 99.5 % of the values lie below, or the greatest
-/// where most are 0.
+/// where most are 0. Signs do not count.
 pub fn robust_top(values: &[f32]) -> f32 {
-    let mut sorted = values.to_vec();
+    let mut sorted: Vec<f32> = values.iter().map(|v| v.abs()).collect();
     sorted.sort_unstable_by(f32::total_cmp);
     let rank = sorted.len() * 995 / 1000;
     let most = sorted.get(rank).copied().unwrap_or(0.0);
@@ -62,7 +85,7 @@ impl Map<'_> {
         for y in 0..map_height {
             for x in 0..map_width {
                 let value = self.values[y / zoom * self.width + x / zoom];
-                canvas.set(x, y, color(value / self.top));
+                canvas.set(x, y, self.scale.color(value, self.top));
             }
         }
         self.legend(&mut canvas, map_height, unit);
@@ -76,7 +99,14 @@ impl Map<'_> {
         let mean =
             self.values.iter().map(|v| f64::from(*v)).sum::<f64>() / self.values.len() as f64;
         let greatest = self.values.iter().copied().fold(0.0, f32::max);
-        let numbers = format!("mean {}, greatest {}", short(mean), short(greatest.into()));
+        let least = self.values.iter().copied().fold(0.0, f32::min);
+        let signed = self.scale == Scale::AboutZero;
+        let numbers = if signed {
+            let [least, greatest] = [least, greatest].map(|v| sign(short(v.into())));
+            format!("mean {}, {least} to {greatest}", sign(short(mean)))
+        } else {
+            format!("mean {}, greatest {}", short(mean), short(greatest.into()))
+        };
         canvas.text(
             left,
             top + half,
@@ -86,15 +116,26 @@ impl Map<'_> {
         for x in left..right {
             let part = (x - left) as f32 / (right - left - 1).max(1) as f32;
             for y in top + 4 * half..top + 6 * half {
-                canvas.set(x, y, color(part));
+                let value = if signed { 2.0 * part - 1.0 } else { part };
+                canvas.set(x, y, self.scale.color(value, 1.0));
             }
         }
+        let most = short(self.top.into());
         let beyond = if greatest > self.top { ">= " } else { "" };
-        let ends = [
-            (0.0, "0".to_owned()),
-            (0.5, short(f64::from(self.top) / 2.0)),
-            (1.0, format!("{beyond}{}", short(self.top.into()))),
-        ];
+        let below = if least < -self.top { "<= " } else { "" };
+        let ends = if signed {
+            [
+                (0.0, format!("{below}-{most}")),
+                (0.5, "0".to_owned()),
+                (1.0, format!("{beyond}+{most}")),
+            ]
+        } else {
+            [
+                (0.0, "0".to_owned()),
+                (0.5, short(f64::from(self.top) / 2.0)),
+                (1.0, format!("{beyond}{most}")),
+            ]
+        };
         for (part, text) in ends {
             let room = (right - left).saturating_sub(text.len() * LETTER * unit);
             let x = left + (part * room as f64) as usize;
@@ -123,8 +164,40 @@ fn short(value: f64) -> String {
     }
 }
 
+/// A number with its sign, be that plus.
+fn sign(number: String) -> String {
+    if number.starts_with('-') || number == "0" {
+        number
+    } else {
+        format!("+{number}")
+    }
+}
+
+/// Blue, white and red, and what lies between: for −1, −1/2, 0, 1/2, 1.
+const DIVERGING: [[f32; 3]; 5] = [
+    [8.0, 48.0, 140.0],
+    [80.0, 150.0, 225.0],
+    [245.0, 245.0, 245.0],
+    [235.0, 120.0, 80.0],
+    [140.0, 10.0, 30.0],
+];
+
+/// From blue to red, `part` in [−1, 1].
+fn diverging(part: f32) -> [u8; 3] {
+    if part.is_nan() {
+        return [0; 3];
+    }
+    let at = 2.0 * (part.clamp(-1.0, 1.0) + 1.0);
+    let first = (at as usize).min(DIVERGING.len() - 2);
+    let rest = at - first as f32;
+    [0, 1, 2].map(|c| {
+        let [a, b] = [DIVERGING[first][c], DIVERGING[first + 1][c]];
+        (a + rest * (b - a)).round() as u8
+    })
+}
+
 /// Magma at `part` of its length; what is not a number takes its end.
-fn color(part: f32) -> [u8; 3] {
+fn magma(part: f32) -> [u8; 3] {
     let last = (MAGMA.len() - 1) as f32;
     let index = if part.is_nan() {
         last
@@ -197,6 +270,7 @@ mod tests {
             values: &values,
             label: "FLIP",
             top: 0.5,
+            scale: Scale::FromZero,
         };
         let codes = map.draw().unwrap();
         let pixel = |x: u32, y: u32| {
@@ -205,15 +279,46 @@ mod tests {
         };
         assert_eq!(codes.width(), 416);
         assert_eq!(codes.height(), 416 + 40);
-        assert_eq!(pixel(0, 0), color(0.0));
-        assert_eq!(pixel(415, 207), color(0.5));
-        assert_eq!(pixel(0, 415), color(1.0));
-        assert_eq!(pixel(415, 415), color(1.0));
-        assert_eq!(pixel(4, 416 + 18), color(0.0));
-        assert_eq!(pixel(411, 416 + 18), color(1.0));
+        assert_eq!(pixel(0, 0), magma(0.0));
+        assert_eq!(pixel(415, 207), magma(0.5));
+        assert_eq!(pixel(0, 415), magma(1.0));
+        assert_eq!(pixel(415, 415), magma(1.0));
+        assert_eq!(pixel(4, 416 + 18), magma(0.0));
+        assert_eq!(pixel(411, 416 + 18), magma(1.0));
         let ink = codes.data().chunks(3).filter(|p| **p == INK).count();
         assert!(ink > 300, "{ink} dots of text");
         assert!(Map { width: 3, ..map }.draw().is_err());
+    }
+
+    #[test]
+    fn a_signed_map_has_white_in_the_middle_and_its_bar_goes_from_blue_to_red() {
+        let values = [-2.0, -0.25, 0.0, 0.5, f32::NAN, 0.0];
+        let map = Map {
+            width: 6,
+            values: &values,
+            label: "(b - a) / a",
+            top: 0.5,
+            scale: Scale::AboutZero,
+        };
+        let codes = map.draw().unwrap();
+        let pixel = |x: u32, y: u32| {
+            let first = (y * codes.width() + x) as usize * 3;
+            [0, 1, 2].map(|c| codes.data()[first + c])
+        };
+        let zoom = codes.width() / 6;
+        let [blue, light_blue, white, _, red] = DIVERGING.map(|c| c.map(|v| v as u8));
+        let right = [blue, light_blue, white, red, [0; 3], white];
+        for (i, right) in right.into_iter().enumerate() {
+            assert_eq!(pixel(i as u32 * zoom, 0), right, "{i}");
+        }
+        let bar = zoom + 18;
+        assert_eq!(pixel(4, bar), blue);
+        assert_eq!(pixel(codes.width() - 5, bar), red);
+        let [r, g, b] = pixel(codes.width() / 2, bar);
+        assert!(r > 240 && g > 240 && b > 240);
+        assert_eq!(robust_top(&[-3.0, 1.0]), 3.0);
+        assert_eq!(sign(short(0.02)), "+0.02");
+        assert_eq!(sign(short(-0.02)), "-0.02");
     }
 
     #[test]

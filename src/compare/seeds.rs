@@ -16,6 +16,7 @@ mod side;
 
 use serde::Serialize;
 
+pub(in crate::compare) use side::LUMINANCE;
 pub use side::{Side, TILE};
 
 use crate::compare::metric::GUARD;

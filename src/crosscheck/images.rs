@@ -5,9 +5,9 @@ use std::path::Path;
 
 use super::Failure;
 use crate::budget::Budget;
-use crate::compare::map::{Map, robust_top};
+use crate::compare::map::{Map, Scale, robust_top};
 use crate::compare::seeds::{self, Verdict};
-use crate::compare::{Layer, Selection};
+use crate::compare::{Layer, Selection, signed};
 use crate::error::Error;
 use crate::image::{self, Image, Metadata};
 
@@ -33,6 +33,47 @@ pub struct Pictures {
     pub ours: Image,
     /// How many standard errors a pixel's two means are apart, row by row.
     pub standard_errors: Vec<f32>,
+    /// By how much Étendue's is brighter, as a part of the reference: see [`signed::relative`].
+    pub brighter: Vec<f32>,
+}
+
+impl Pictures {
+    /// Writes the mean images `mitsuba.exr` and `etendue.exr` and two maps into a folder that is there: `error.png`, of
+    /// how many standard errors they are apart, and `signed.png`, of where Étendue's is brighter and where darker.
+    pub(super) fn keep(&self, folder: &Path) -> Result<(), Failure> {
+        for (image, name) in [
+            (&self.reference, "mitsuba.exr"),
+            (&self.ours, "etendue.exr"),
+        ] {
+            image::write(&folder.join(name), image, &Metadata::default())?;
+        }
+        let width = self.reference.width() as usize;
+        for (values, label, scale, name) in [
+            (
+                &self.standard_errors,
+                "standard errors apart",
+                Scale::FromZero,
+                "error.png",
+            ),
+            (
+                &self.brighter,
+                "brighter than Mitsuba",
+                Scale::AboutZero,
+                "signed.png",
+            ),
+        ] {
+            let top = robust_top(values);
+            let map = Map {
+                width,
+                values,
+                label,
+                top,
+                scale,
+            };
+            image::write_codes(&folder.join(name), &map.draw()?, image::Tag::Srgb)?;
+        }
+        Ok(())
+    }
 }
 
 /// The images of both sides so far; the reference comes first.
@@ -65,36 +106,10 @@ impl Images {
         Ok(())
     }
 
-    /// Pixels across and down.
-    pub(super) fn size(&self) -> [u32; 2] {
-        let mean = self.means[0].image.as_ref();
-        mean.map_or([0; 2], |image| [image.width(), image.height()])
-    }
-
     /// Holds the sides against each other.
     pub(super) fn judge(&self) -> Result<Verdict, Failure> {
         let [reference, ours] = self.sides()?;
         Ok(seeds::judge(reference, ours, CONFIDENCE)?)
-    }
-
-    /// Writes the mean images `mitsuba.exr` and `etendue.exr`, and `error.png`, a map of how many standard
-    /// errors they are apart, into a folder that is there.
-    pub(super) fn keep(&self, folder: &Path) -> Result<(), Failure> {
-        for (mean, name) in self.means.iter().zip(["mitsuba.exr", "etendue.exr"]) {
-            if let Some(image) = &mean.image {
-                image::write(&folder.join(name), image, &Metadata::default())?;
-            }
-        }
-        let [reference, ours] = self.sides()?;
-        let values = seeds::map(reference, ours)?;
-        let map = Map {
-            width: self.size()[0] as usize,
-            values: &values,
-            label: "standard errors apart",
-            top: robust_top(&values),
-        };
-        image::write_codes(&folder.join("error.png"), &map.draw()?, image::Tag::Srgb)?;
-        Ok(())
     }
 
     /// The mean images, and how far they are apart.
@@ -103,9 +118,11 @@ impl Images {
         let standard_errors = seeds::map(reference, ours)?;
         let [reference, ours] = self.means.map(|mean| mean.image);
         let none = || Failure::Broken("there are no images".to_owned());
+        let (reference, ours) = (reference.ok_or_else(none)?, ours.ok_or_else(none)?);
         Ok(Pictures {
-            reference: reference.ok_or_else(none)?,
-            ours: ours.ok_or_else(none)?,
+            brighter: signed::relative(&reference, &ours, reference.rgb())?,
+            reference,
+            ours,
             standard_errors,
         })
     }

@@ -76,7 +76,7 @@ pub struct Settings {
     pub threads: Option<u32>,
     /// The longest that either side may take to load the scene, and to render a seed.
     pub timeout: Duration,
-    /// Where the mean images of both sides and a map of the error are kept.
+    /// Where the mean images of both sides and two maps of the error are kept.
     pub keep: Option<PathBuf>,
     /// Whether [`Crosscheck::pictures`] are wanted.
     pub pictures: bool,

@@ -146,18 +146,22 @@ pub fn crosscheck(
             images.push(theirs, ours)?;
         }
     }
-    if let Some(folder) = &settings.keep {
-        images.keep(folder)?;
-    }
     let notes = notes(&sides);
     let spp = sides[0].spp;
     let [etendue, mitsuba] = sides.map(Runner::finish);
     let judged = !settings.timing_only;
+    let verdict = judged.then(|| images.judge()).transpose()?;
+    let wanted = judged && (settings.pictures || settings.keep.is_some());
+    let mut pictures = wanted.then(|| images.pictures()).transpose()?;
+    if let (Some(folder), Some(pictures)) = (&settings.keep, &pictures) {
+        pictures.keep(folder)?;
+    }
+    if !settings.pictures {
+        pictures = None;
+    }
     Ok(Crosscheck {
-        verdict: judged.then(|| images.judge()).transpose()?,
-        pictures: (judged && settings.pictures)
-            .then(|| images.pictures())
-            .transpose()?,
+        verdict,
+        pictures,
         spp,
         seeds: settings.seeds,
         notes,

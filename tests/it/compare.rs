@@ -540,3 +540,29 @@ fn json_holds_every_metric_and_maps_have_their_legend() {
         assert_eq!((map.width(), map.height()), (432, 472), "{of}");
     }
 }
+
+#[test]
+fn a_signed_map_is_red_where_the_second_is_brighter_and_blue_where_it_is_darker() {
+    let place = Place::new();
+    // The hill's top, in the picture enlarged by 18, beside no difference at all.
+    let top = |arguments: &str, status: i32| {
+        place.says(&format!("{arguments} --signed-map map.png -q"), status, "");
+        let account = etendue::budget::Budget::default().open();
+        let map = image::read(&place.path("map.png"), &account).unwrap().image;
+        assert_eq!((map.width(), map.height()), (432, 472), "{arguments}");
+        [0, 1, 2].map(|c| map.get(12 * 18, 12 * 18, c))
+    };
+    for (arguments, redder) in [
+        ("a.exr b.exr", true),
+        ("b.exr a.exr", false),
+        ("--a s1.exr s2.exr --b t3.exr t4.exr --confidence 0.5", true),
+        ("b.exr --reference a.exr --variance a.exr --spp 64", true),
+        ("a.exr --reference b.exr --variance a.exr --spp 64", false),
+    ] {
+        let [r, _, b] = top(arguments, 1);
+        assert_eq!(r > b + 0.1, redder, "{arguments}: {r} {b}");
+        assert_eq!(b > r + 0.1, !redder, "{arguments}: {r} {b}");
+    }
+    let same = top("a.exr a.exr", 0);
+    assert!(same.iter().all(|v| *v > 0.9), "{same:?}");
+}

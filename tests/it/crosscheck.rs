@@ -142,7 +142,7 @@ mod impostors {
         let arguments = "bright.xml --reference dim.xml --python ./python --seeds 6 --keep kept";
         let told = place.says(1, arguments);
         assert!(told.contains("bright.xml: differ"), "{told}");
-        for name in ["mitsuba.exr", "etendue.exr", "error.png"] {
+        for name in ["mitsuba.exr", "etendue.exr", "error.png", "signed.png"] {
             assert!(place.path("kept/bright").join(name).is_file(), "{name}");
         }
         let told = place.says(1, &format!("{arguments} --json"));

@@ -28,6 +28,7 @@ pub(super) fn against_reference(
     };
     let outcome = ztest::ztest(&layer, spp, &reference)?;
     arguments.draw(&layer, &outcome.map, "|z|", T_TOP)?;
+    arguments.draw_signed(&mean.image, &layer.image, mean.rgb)?;
     let lines = vec![format!(
         "  accepted {:.5}, gain {:+.5} ± {:.5}, z rms {:.3}, greatest {:.2} (bound {:.2})",
         outcome.accepted,

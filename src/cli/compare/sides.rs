@@ -31,6 +31,9 @@ pub(super) fn sides(arguments: &Arguments) -> Result<Outcome> {
         let values = seeds::map(&a, &b)?;
         arguments.draw(&layer, &values, "|t| between seeds", T_TOP)?;
     }
+    if arguments.signed_map.is_some() {
+        arguments.draw_signed(&a.mean()?, &b.mean()?, layer.rgb)?;
+    }
     let mut lines = head(&layer, &[]);
     lines.extend(verdict_lines(&verdict));
     let mut object = serde_json::to_value(&verdict).expect("it has only names and numbers");

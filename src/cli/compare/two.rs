@@ -33,6 +33,7 @@ pub(super) fn two(arguments: &Arguments, path_a: &Path, path_b: &Path) -> Result
     if arguments.map.is_some() {
         draw_pair(arguments, &a, &b)?;
     }
+    arguments.draw_signed(&a.image, &b.image, a.rgb)?;
     let mut object = serde_json::to_value(&report).expect("it has only names and numbers");
     object["a"] = path_a.display().to_string().into();
     object["b"] = path_b.display().to_string().into();

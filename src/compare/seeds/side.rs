@@ -9,7 +9,7 @@ use crate::image::Image;
 pub const TILE: usize = 16;
 
 /// Luminance of linear BT.709.
-const LUMINANCE: [f64; 3] = [0.212_671, 0.715_160, 0.072_169];
+pub(in crate::compare) const LUMINANCE: [f64; 3] = [0.212_671, 0.715_160, 0.072_169];
 
 /// One side: what is kept of its images, one after another.
 #[derive(Clone, Debug)]
@@ -135,6 +135,20 @@ impl Side {
             mean,
             squares,
         }
+    }
+
+    /// The mean of its images.
+    ///
+    /// # Errors
+    /// Where it does not fit into memory.
+    pub fn mean(&self) -> Result<Image> {
+        let side = |n: usize| u32::try_from(n).map_err(|_| Error::input("the image is too large"));
+        let (width, height) = (side(self.width)?, side(self.height)?);
+        let mut image = Image::try_new(width, height, self.channels.clone())?;
+        for (value, [mean, _]) in image.data_mut().iter_mut().zip(&self.pixels) {
+            *value = *mean as f32;
+        }
+        Ok(image)
     }
 
     /// The mean of the whole image over all channels.
