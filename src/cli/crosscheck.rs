@@ -7,15 +7,14 @@ use std::time::Duration;
 use clap::{Args, ValueEnum};
 use etendue::crosscheck::{self, Python, Settings, Side, Watch};
 use etendue::error::{Error, Result};
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::oracle::Subject;
 use super::overrides::ImageArguments;
-use super::progress::StepLines;
+use super::progress::{self, Count, Steps, Told};
 use super::scene::ReadArguments;
 use super::stop::Stop;
 use super::verdicts::{self, Ending, Style};
-use super::{output, page, parse, report, status};
+use super::{output, page, parse, status};
 
 /// Hold scenes against what Mitsuba renders, or rays against the z-buffer, and say whether they agree
 ///
@@ -73,7 +72,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "DIR")]
     plugins: Option<PathBuf>,
     /// Threads of each side; one a processor by default
-    #[arg(long, value_name = "N", value_parser = parse::threads)]
+    #[arg(long, value_name = "N", value_parser = parse::threads, allow_negative_numbers = true)]
     threads: Option<NonZeroUsize>,
     /// The longest that a side may take to load a scene, and to render a seed
     #[arg(long, value_name = "SECONDS", default_value = "300", value_parser = parse::seconds)]
@@ -96,9 +95,12 @@ pub(super) struct Arguments {
     /// Print a JSON object for each scene
     #[arg(long)]
     json: bool,
-    /// No progress bar, no paragraph on scenes that agree
+    /// No progress, no paragraph on scenes that agree
     #[arg(short, long)]
     quiet: bool,
+    /// How progress is told on standard error, which --against raster has none of
+    #[arg(long, value_enum, value_name = "HOW", default_value_t = Told::Auto)]
+    progress: Told,
 }
 
 /// What scenes are held against.
@@ -200,11 +202,18 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         };
         return subject.run();
     }
+    let told = arguments.progress.unless(arguments.quiet);
+    let status = beside_mitsuba(arguments, told)?;
+    progress::done(told, status);
+    Ok(status)
+}
+
+fn beside_mitsuba(arguments: &Arguments, told: Told) -> Result<u8> {
     let folders = folders(&arguments.scenes);
     let mut settings = match arguments.settings() {
         Ok(settings) => settings,
         Err(error) => {
-            report::error(&error);
+            progress::fail(told, &error);
             return Ok(status::CANNOT_COMPARE);
         }
     };
@@ -224,9 +233,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
             .as_ref()
             .map(|folder| folder.join(&folders[i]));
         let name = scene.display().to_string();
-        let bar = Bar::new(&name, arguments.quiet, &stop);
-        let result = crosscheck::crosscheck(scene, &settings, &bar);
-        bar.bar.finish_and_clear();
+        let steps = Steps::new(told, &name, Count::Images);
+        let watch = Progress { steps, stop: &stop };
+        let result = crosscheck::crosscheck(scene, &settings, &watch);
+        watch.steps.finish();
         let ending = Ending::of(result, style);
         verdicts::tell(style, &name, &ending);
         let hopeless = ending.is_hopeless() || stop.signalled();
@@ -288,42 +298,16 @@ pub(super) fn serve() -> Result<u8> {
     Ok(status::DONE)
 }
 
-/// Progress over the images of a scene: a bar on a terminal, else lines.
-struct Bar<'a> {
-    bar: ProgressBar,
-    lines: StepLines,
-    name: &'a str,
+/// Progress over the images of a scene.
+struct Progress<'a> {
+    steps: Steps,
     stop: &'a Stop,
 }
 
-impl<'a> Bar<'a> {
-    fn new(name: &'a str, quiet: bool, stop: &'a Stop) -> Self {
-        let target = if quiet {
-            ProgressDrawTarget::hidden()
-        } else {
-            ProgressDrawTarget::stderr_with_hz(5)
-        };
-        let bar = ProgressBar::with_draw_target(Some(0), target);
-        let template = "{prefix} [{bar:30}] {pos}/{len} images, {msg}";
-        bar.set_style(ProgressStyle::with_template(template).expect("the template is right"));
-        bar.set_prefix(name.to_owned());
-        Self {
-            bar,
-            lines: StepLines::new(quiet),
-            name,
-            stop,
-        }
-    }
-}
-
-impl Watch for Bar<'_> {
+impl Watch for Progress<'_> {
     fn at(&self, side: Side, done: u32, total: u32) {
-        self.bar.set_length(total.into());
-        self.bar.set_position(done.into());
-        self.bar.set_message(format!("{side} at work"));
-        let name = self.name;
-        self.lines
-            .say(|| format!("{name}: {done} of {total} images, {side} at work"));
+        let what = format!("{side} at work");
+        self.steps.at(done.into(), total.into(), &what);
     }
 
     fn stop(&self) -> bool {

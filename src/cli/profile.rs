@@ -9,11 +9,10 @@ use clap::Args;
 use etendue::error::{Error, Result};
 use etendue::file;
 use etendue::profile::{self, Axis, Comparison, Effort, Profile, Settings, Subject, Watch};
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::memory::MemoryArguments;
 use super::overrides::MethodArguments;
-use super::progress::StepLines;
+use super::progress::{self, Count, Steps, Told};
 use super::scene::SceneArguments;
 use super::stop::Stop;
 use super::{growth, output, parse, status};
@@ -64,9 +63,12 @@ pub(super) struct Arguments {
     /// Print the profile as JSON in place of tables
     #[arg(long)]
     json: bool,
-    /// No progress bar
+    /// No progress
     #[arg(short, long)]
     quiet: bool,
+    /// How progress is told on standard error
+    #[arg(long, value_enum, value_name = "HOW", default_value_t = Told::Auto)]
+    progress: Told,
 }
 
 const EXAMPLES: &str = "\
@@ -110,18 +112,29 @@ impl Arguments {
 
 /// Runs the command; the answer is the exit status.
 pub(super) fn run(arguments: &Arguments) -> Result<u8> {
+    let told = arguments.progress.unless(arguments.quiet);
+    let status = profile(arguments, told).unwrap_or_else(|error| {
+        progress::fail(told, &error);
+        status::of(&error)
+    });
+    progress::done(told, status);
+    Ok(status)
+}
+
+fn profile(arguments: &Arguments, told: Told) -> Result<u8> {
     let stop = Stop::on_signals()?;
     let settings = arguments.settings(&stop)?;
     let old = arguments.compare.as_deref().map(read).transpose()?;
     if let Some(folder) = &arguments.output {
         fs::create_dir_all(folder).map_err(|e| Error::system("make the folder", folder, &e))?;
     }
-    let bar = Bar::new(arguments.quiet, stop);
-    let profile = profile::run(&settings, &bar);
-    bar.bar.finish_and_clear();
+    let steps = Steps::new(told, "profiling", Count::Percent);
+    let watch = Progress { steps, stop };
+    let profile = profile::run(&settings, &watch);
+    watch.steps.finish();
     let profile = match profile {
         Ok(Some(profile)) => profile,
-        Err(error) if !bar.stop.signalled() => return Err(error),
+        Err(error) if !watch.stop.signalled() => return Err(error),
         _ => return Ok(status::INTERRUPTED),
     };
     let comparison = old.map(|old| profile.since(&old));
@@ -138,7 +151,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     } else {
         growth::print(&profile, comparison.as_ref());
     }
-    Ok(if bar.stop.signalled() {
+    Ok(if watch.stop.signalled() {
         status::INTERRUPTED
     } else {
         status::DONE
@@ -169,41 +182,18 @@ fn write(folder: &Path, profile: &Profile, comparison: Option<&Comparison>) -> R
     Ok(())
 }
 
-/// Progress on standard error: a bar on a terminal, else lines.
-struct Bar {
-    bar: ProgressBar,
-    lines: StepLines,
+/// Progress on standard error.
+struct Progress {
+    steps: Steps,
     stop: Stop,
 }
 
-/// Steps of the bar.
+/// Steps of which progress consists.
 const STEPS: f64 = 1000.0;
 
-impl Bar {
-    fn new(quiet: bool, stop: Stop) -> Self {
-        let target = if quiet {
-            ProgressDrawTarget::hidden()
-        } else {
-            ProgressDrawTarget::stderr_with_hz(5)
-        };
-        let bar = ProgressBar::with_draw_target(Some(STEPS as u64), target);
-        let template = "profiling [{bar:30}] {percent:>3} % {msg}, {eta} left";
-        bar.set_style(ProgressStyle::with_template(template).expect("the template is right"));
-        Self {
-            bar,
-            lines: StepLines::new(quiet),
-            stop,
-        }
-    }
-}
-
-impl Watch for Bar {
+impl Watch for Progress {
     fn at(&self, what: &str, part: f64) {
-        self.bar.set_position((part * STEPS) as u64);
-        self.bar.set_message(what.to_owned());
-        let percent = 100.0 * part;
-        self.lines
-            .say(|| format!("profiling: {percent:.0} %, {what}"));
+        self.steps.at((part * STEPS) as u64, STEPS as u64, what);
     }
 
     fn stop(&self) -> bool {

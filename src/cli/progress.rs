@@ -18,7 +18,7 @@ use super::output;
 use super::stop::Stop;
 
 pub(super) use events::emit;
-pub(super) use steps::StepLines;
+pub(super) use steps::{Count, Steps, done, fail};
 
 /// How progress is told.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -33,6 +33,16 @@ pub(super) enum Told {
     Json,
     /// Not at all
     None,
+}
+
+impl Told {
+    /// Nothing where nobody said how and `quiet` is asked for.
+    pub(super) fn unless(self, quiet: bool) -> Self {
+        match self {
+            Self::Auto if quiet => Self::None,
+            told => told,
+        }
+    }
 }
 
 #[derive(Debug)]

@@ -285,10 +285,7 @@ impl Arguments {
 
     /// How progress is told.
     fn told(&self) -> Told {
-        match self.progress {
-            Told::Auto if self.quiet => Told::None,
-            told => told,
-        }
+        self.progress.unless(self.quiet)
     }
 
     /// The images of this call.
@@ -608,10 +605,10 @@ impl<'a> Series<'a> {
         }
         let map = Map {
             width: heat.width,
-            scale: Scale::FromZero,
             values: &heat.node_steps,
             label: "node steps a sample",
             top: robust_top(&heat.node_steps),
+            scale: Scale::FromZero,
         };
         image::write_codes(path, &map.draw()?, image::Tag::Srgb)
     }
@@ -706,11 +703,7 @@ impl<'a> Series<'a> {
 
     /// Says why an image is not there.
     fn fail(&self, error: &Error) {
-        if self.arguments.told() == Told::Json {
-            let problems = error.problems().iter();
-            return problems.for_each(|problem| self.problem("error", problem));
-        }
-        report::error(error);
+        progress::fail(self.arguments.told(), error);
     }
 
     fn problem(&self, severity: &str, problem: &Problem) {

@@ -157,6 +157,33 @@ mod impostors {
     }
 
     #[test]
+    fn programs_are_told_how_far_it_is() {
+        let place = Place::new();
+        place.etendue_as_mitsuba();
+        let arguments = "dim.xml missing.xml --python ./python --seeds 3 --spp 1 --precision 9";
+        let output = place.run(&format!("{arguments} --progress json"));
+        let told = String::from_utf8_lossy(&output.stderr);
+        let events: Vec<Value> = told
+            .lines()
+            .map(|line| serde_json::from_str(line).expect("an event"))
+            .collect();
+        let named = |name: &str| events.iter().filter(|e| e["event"] == name).collect();
+        let [started, progress, done]: [Vec<&Value>; 3] =
+            ["started", "progress", "done"].map(named);
+        assert_eq!(started.len(), 2, "{told}");
+        assert_eq!((done.len(), &done[0]["status"]), (1, &2.into()), "{told}");
+        for event in &progress {
+            assert_eq!(event["total"], 6);
+            assert!(
+                event["what"]
+                    .as_str()
+                    .is_some_and(|what| what.ends_with("at work"))
+            );
+        }
+        assert!(!progress.is_empty(), "{told}");
+    }
+
+    #[test]
     fn what_is_too_noisy_is_not_called_agreement_and_times_need_no_verdict() {
         let place = Place::new();
         place.etendue_as_mitsuba();

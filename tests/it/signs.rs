@@ -109,6 +109,39 @@ fn a_long_render_tells_how_far_it_is_and_when_it_will_end() {
 }
 
 #[test]
+fn a_profile_tells_programs_how_far_it_is() {
+    let place = Place::new();
+    let sweep = "profile a.xml --quick --rounds 1 --sweep samples --json --progress json";
+    let output = place.run(sweep);
+    assert_eq!(output.status.code(), Some(0));
+    let events = objects(&output.stderr);
+    assert!(events.iter().all(|event| event["format"] == 1));
+    let is = |event: &Value, name: &str| event["event"] == name;
+    assert!(is(&events[0], "started"), "{events:?}");
+    let (done, progress) = events[1..].split_last().expect("there is an end");
+    assert!(is(done, "done") && done["status"] == 0, "{events:?}");
+    assert!(!progress.is_empty(), "{events:?}");
+    for event in progress {
+        assert!(is(event, "progress"), "{event}");
+        assert!(event["done"].as_u64() <= event["total"].as_u64());
+        assert!(event["what"].is_string() && event["seconds"].is_f64());
+    }
+    let output = place.run("profile broken.xml --progress json");
+    let events = objects(&output.stderr);
+    assert!(
+        events.iter().any(|event| is(event, "problem")),
+        "{events:?}"
+    );
+    assert_eq!(events[events.len() - 1]["status"], 1);
+    for words in ["--progress none", "-q"] {
+        let output = place.run(&format!(
+            "profile a.xml --quick --rounds 1 --sweep samples {words}"
+        ));
+        assert!(output.stderr.is_empty(), "{words}");
+    }
+}
+
+#[test]
 fn without_a_terminal_a_line_comes_after_ten_seconds() {
     let place = Place::new();
     let output = place.run("render a.xml -o a.exr --spp 10000000 --time-limit 11.5");

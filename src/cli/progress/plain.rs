@@ -31,14 +31,20 @@ impl Lines {
     }
 
     pub(super) fn advance(&self, state: &State<'_>) {
+        if self.due(state.share()) {
+            output::note(&line(state));
+        }
+    }
+
+    /// Whether it is time for a line, which then counts as written; `share` is what is done, in [0, 1].
+    pub(super) fn due(&self, share: f64) -> bool {
         let mut last = self.0.lock().expect("no thread panics while it looks");
         let silent = last.0.elapsed();
-        let share = state.share();
-        if silent < SHORTEST || silent < LONGEST && share - last.1 < SHARE {
-            return;
+        let due = silent >= SHORTEST && (silent >= LONGEST || share - last.1 >= SHARE);
+        if due {
+            *last = (Instant::now(), share);
         }
-        *last = (Instant::now(), share);
-        output::note(&line(state));
+        due
     }
 }
 
