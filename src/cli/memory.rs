@@ -24,7 +24,7 @@ pub(super) struct RunArguments {
     #[command(flatten)]
     pub(super) memory: MemoryArguments,
     /// Threads; 0, the default, is one a processor. The image does not depend on it
-    #[arg(long, value_name = "N", value_parser = parse::threads, help_heading = RUN)]
+    #[arg(long, value_name = "N", value_parser = parse::threads, allow_negative_numbers = true, help_heading = RUN)]
     pub(super) threads: Option<NonZeroUsize>,
 }
 

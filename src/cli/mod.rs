@@ -24,6 +24,7 @@ mod spectrum;
 mod available;
 mod display;
 mod growth;
+mod hints;
 mod images;
 mod memory;
 mod oracle;
@@ -44,7 +45,7 @@ mod version;
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 
 /// Étendue: a CPU ray tracer for Mitsuba 3 scenes and bare meshes.
 #[derive(Debug, Parser)]
@@ -83,7 +84,10 @@ const CROSSCHECK_WORKER: &str = "crosscheck-worker";
 /// Runs the command that the arguments name.
 pub(crate) fn run() -> ExitCode {
     stop::Stop::instead_of_aborts();
-    let result = match Arguments::parse().command {
+    let words: Vec<_> = std::env::args_os().collect();
+    let arguments = Arguments::try_parse_from(&words)
+        .unwrap_or_else(|error| hints::better(error, &Arguments::command(), &words).exit());
+    let result = match arguments.command {
         Command::Render(arguments) => render::run(&arguments),
         Command::Batch(arguments) => batch::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),

@@ -166,7 +166,8 @@ pub(super) fn bytes(text: &str) -> Parsed<u64> {
         .find(|c: char| !(c.is_ascii_digit() || c == '.'))
         .unwrap_or(text.len());
     let (number, unit) = text.split_at(end);
-    let factor = match unit.trim().to_lowercase().trim_end_matches('b') {
+    let unit_in_small = unit.trim().to_lowercase();
+    let factor = match unit_in_small.strip_suffix('b').unwrap_or(&unit_in_small) {
         "" => 1.0,
         "k" => 1e3,
         "m" => 1e6,
@@ -387,7 +388,7 @@ mod tests {
         assert_eq!(bytes("1.5 GiB"), Ok(3 << 29));
         assert_eq!(bytes("512"), Ok(512));
         assert_eq!(bytes("none"), Ok(u64::MAX));
-        for wrong in ["", "G", "8X", "1.2.3M", "-1"] {
+        for wrong in ["", "G", "8X", "1.2.3M", "-1", "2GBB", "8bb"] {
             assert!(bytes(wrong).is_err(), "{wrong:?}");
         }
     }

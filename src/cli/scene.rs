@@ -12,6 +12,11 @@ use etendue::render::{self, BareMesh, Session, Staging, UpAxis};
 use super::output::with_frame;
 use super::parse;
 
+/// What images are called.
+const IMAGES: [&str; 10] = [
+    "exr", "hdr", "pfm", "png", "jpg", "jpeg", "bmp", "tga", "ppm", "pgm",
+];
+
 /// How scenes are read.
 #[derive(Args, Clone, Debug)]
 pub(super) struct ReadArguments {
@@ -119,7 +124,13 @@ impl SceneArguments {
             return Ok(());
         }
         let message = format!("{}: neither a scene nor a mesh", input.display());
-        Err(Error::input(message).help("a scene is an .xml file, a mesh a .ply or .obj"))
+        let extension = input.extension().unwrap_or_default().to_ascii_lowercase();
+        let is_image = IMAGES.iter().any(|image| extension == *image);
+        Err(Error::input(message).help(if is_image {
+            "it is an image: `etendue info` tells what it holds, `etendue convert` makes another of it"
+        } else {
+            "a scene is an .xml file, a mesh a .ply, .obj, .stl, .serialized, .gltf or .glb"
+        }))
     }
 
     /// Which way is up in a bare mesh.

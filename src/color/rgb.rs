@@ -139,6 +139,11 @@ pub(super) fn check(values: impl IntoIterator<Item = f64>, role: Role) -> Result
             return Err(format!("{v} is not a finite number"));
         }
         match role {
+            Role::Reflectance if v > 1.0 && v <= 255.0 && v == v.trunc() => {
+                return Err(format!(
+                    "a reflectance lies in [0, 1], and {v} does not; codes up to 255 are written as #rrggbb"
+                ));
+            }
             Role::Reflectance if !(0.0..=1.0).contains(&v) => {
                 return Err(format!("a reflectance lies in [0, 1], and {v} does not"));
             }

@@ -151,10 +151,19 @@ impl Defines {
                 ))
             } else {
                 let known = self.known.iter().take(CANDIDATES).map(String::as_str);
-                Error::input(format!(
+                let error = Error::input(format!(
                     "the scene has no parameter ${name} to be set by -D"
-                ))
-                .suggest(name, known)
+                ));
+                let error = error.suggest(name, known.clone());
+                if self.known.is_empty() {
+                    error.help(
+                        "none of its values is a $parameter; options such as --spp and --size replace some, \
+                         and the others stand in the file",
+                    )
+                } else {
+                    let names: Vec<String> = known.take(10).map(|n| format!("${n}")).collect();
+                    error.help(format!("its parameters are {}", names.join(", ")))
+                }
             });
         }
     }

@@ -479,11 +479,19 @@ impl<'a> Properties<'a> {
         };
         match of(&property.value) {
             Some(value) => Ok(Some(value)),
-            None => Err(Error::input(format!(
-                "property {name:?}: expected {expected}, found {}",
-                found()
-            ))
-            .at(&property.location)),
+            None => {
+                let error = Error::input(format!(
+                    "property {name:?}: expected {expected}, found {}",
+                    found()
+                ));
+                let error = error.at(&property.location);
+                Err(match expected.rsplit_once(' ') {
+                    Some((_, tag @ ("boolean" | "float" | "integer" | "string"))) => {
+                        error.help(format!("write <{tag} name={name:?} value=\"…\"/>"))
+                    }
+                    _ => error,
+                })
+            }
         }
     }
 }
@@ -549,7 +557,8 @@ mod tests {
         let sphere = shape(&scene);
         assert_eq!(
             sphere.float("radius").unwrap_err().to_string(),
-            "test.xml:3:3: property \"radius\": expected a float, found a string"
+            "test.xml:3:3: property \"radius\": expected a float, found a string; \
+             write <float name=\"radius\" value=\"…\"/>"
         );
         assert_eq!(sphere.given::<f64>("height").unwrap(), None);
     }

@@ -18,6 +18,9 @@ pub(super) struct Reference {
     pub(super) target: String,
 }
 
+/// As many ids are listed where none is near.
+const SHOWN: usize = 10;
+
 /// Gives every reference its node and notes those that have none.
 pub(super) fn references(reader: &mut Reader<'_>, report: &mut Report) {
     for reference in &reader.references {
@@ -33,14 +36,21 @@ pub(super) fn references(reader: &mut Reader<'_>, report: &mut Report) {
         match reader.ids.get(target) {
             Some(&(id, _)) => property.value = Value::Object(id),
             None if reader.lost_ids.contains(target) => {}
-            None => report.push(
-                Error::input(format!("nothing has the id {target:?}"))
-                    .at(&property.location)
-                    .suggest(
-                        target,
-                        reader.ids.keys().take(CANDIDATES).map(String::as_str),
-                    ),
-            ),
+            None => {
+                let ids = || reader.ids.keys().map(String::as_str);
+                let error = Error::input(format!("nothing has the id {target:?}"));
+                let error = error.at(&property.location);
+                // What is near weighs more than what there is.
+                let error = error.suggest(target, ids().take(CANDIDATES));
+                let few: Vec<&str> = ids().take(SHOWN + 1).collect();
+                report.push(match few.len() {
+                    0 => error.help(format!(
+                        "say what is meant, as in <bsdf type=\"diffuse\" id={target:?}>"
+                    )),
+                    1..=SHOWN => error.help(format!("the scene's ids are {}", few.join(", "))),
+                    _ => error,
+                });
+            }
         }
     }
 }

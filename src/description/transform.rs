@@ -201,7 +201,8 @@ fn look_at(element: &Element<'_>) -> Result<DMat4> {
         .unwrap_or(direction.any_orthonormal_pair().0);
     let left = up.cross(direction);
     if left.length() < PARALLEL {
-        return Err(element.error("the up vector of <lookat> is parallel to its direction"));
+        let error = element.error("the up vector of <lookat> is parallel to its direction");
+        return Err(error.help("give up another direction, such as 0, 0, 1"));
     }
     let left = left.normalize();
     let up = direction.cross(left);

@@ -64,7 +64,31 @@ pub(super) fn number(text: &str) -> Result<f64> {
     match text.parse::<f64>() {
         Ok(x) if x.is_finite() => Ok(x),
         Ok(_) => Err(Error::input(format!("{} is not finite", quoted(text)))),
-        Err(_) => Err(Error::input(format!("{} is not a number", quoted(text)))),
+        Err(_) => {
+            let error = Error::input(format!("{} is not a number", quoted(text)));
+            Err(match meant(text) {
+                Some(help) => error.help(help),
+                None => error,
+            })
+        }
+    }
+}
+
+/// What may help where a number is followed by something else.
+fn meant(text: &str) -> Option<&'static str> {
+    let end = text.find(|c: char| !(c.is_ascii_digit() || "+-.".contains(c)))?;
+    let (number, rest) = text.split_at(end);
+    number.parse::<f64>().ok()?;
+    match rest.trim() {
+        "%" => Some("write a part of 1: 0.5 for 50 %"),
+        "°" | "deg" | "degree" | "degrees" | "rad" => {
+            Some("angles are in degrees, and written without a unit")
+        }
+        "m" | "cm" | "mm" | "km" | "in" | "ft" | "px" | "nm" | "s" | "W" => {
+            Some("numbers are written without a unit")
+        }
+        rest if rest.starts_with(',') => Some("one number is wanted; its decimal point is a point"),
+        _ => None,
     }
 }
 

@@ -137,6 +137,13 @@ pub(super) fn parse<'t>(text: &'t str, lines: &Lines<'t>) -> Result<Document<'t>
             roxmltree::Error::InvalidChar(b'"' | b'\'', b'<', _) => {
                 "'<' inside an attribute: close the quotes, or write &lt;".into()
             }
+            roxmltree::Error::UnexpectedCloseTag(open, close, _) => {
+                format!("<{open}> is still open at </{close}>: close it by </{open}>")
+            }
+            roxmltree::Error::MalformedEntityReference(_) => "write &amp; for &".into(),
+            roxmltree::Error::InvalidChar2("a whitespace", _, _) => {
+                "a space is wanted here; is a quote missing before?".into()
+            }
             _ => e.to_string().replace(&format!(" at {pos}"), ""),
         };
         Error::input(format!("not well-formed XML: {message}")).at(&Location {

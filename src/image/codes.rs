@@ -225,7 +225,8 @@ pub fn write_codes<T: Code>(path: &Path, codes: &Codes<T>, tag: Tag) -> Result<(
         Format::Exr | Format::Hdr | Format::Pfm => {
             let path = path.display();
             return Err(
-                Error::input(format!("codes cannot be stored as {path}")).help("use .png or .jpg")
+                Error::input(format!("a picture for screens cannot be stored as {path}"))
+                    .help("use .png or .jpg"),
             );
         }
     };

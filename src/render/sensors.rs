@@ -31,14 +31,19 @@ pub fn find_sensor(description: &Description, name: &str) -> Result<usize> {
     let by_number = || name.parse().ok().filter(|n| *n < names.len());
     by_id.or_else(by_number).ok_or_else(|| {
         let root = description.root();
-        let message = match names.len() {
-            0 => "the scene has no sensor".to_owned(),
-            _ => format!(
+        let message = match &names[..] {
+            [] => "the scene has no sensor".to_owned(),
+            [only] => format!("the scene has no sensor {name:?}: its only one is {only:?}"),
+            names => format!(
                 "the scene has no sensor {name:?}; there are {}",
                 names.join(", ")
             ),
         };
         let error = Error::input(message).at(root.location());
+        // Of numbers one is as close as another.
+        if name.parse::<usize>().is_ok() {
+            return error;
+        }
         error.suggest(name, names.iter().map(String::as_str))
     })
 }

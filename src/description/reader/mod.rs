@@ -155,6 +155,9 @@ impl<'o> Reader<'o> {
         let text = xml::tidy(text);
         let tree = xml::parse(&text, &lines)?;
         let root = Element::open(tree.root_element(), &lines, &mut self.defines)?;
+        if include.is_none() && root.tag != "scene" {
+            return Err(root.error(format!("expected <scene>, found <{}>", root.tag)));
+        }
         let version = root
             .required("version")
             .map_err(|e| e.help("write version=\"3.0.0\""))?
@@ -180,9 +183,6 @@ impl<'o> Reader<'o> {
     }
 
     fn root(&mut self, root: &Element<'_>, file: &File<'_>) -> Result<()> {
-        if root.tag != "scene" {
-            return Err(root.error(format!("expected <scene>, found <{}>", root.tag)));
-        }
         root.only(&["version", "type", "id", "name"])?;
         let id = self.node(root, file, Kind::Scene, "scene")?;
         self.children(root, file, id, 1);
@@ -268,9 +268,14 @@ impl<'o> Reader<'o> {
                 }
                 _ => {
                     let plugins = Kind::ALL.iter().map(|kind| kind.tag());
-                    element
-                        .error(format!("unknown tag <{tag}>"))
-                        .suggest(tag, plugins.chain(values::TAGS).chain(STRUCTURE))
+                    let error = element.error(format!("unknown tag <{tag}>"));
+                    match tag {
+                        "light" | "lamp" | "luminaire" => error.help("lights are <emitter>"),
+                        "camera" => error.help("cameras are <sensor>"),
+                        "material" => error.help("materials are <bsdf>"),
+                        "mesh" | "object" => error.help("objects are <shape>"),
+                        _ => error.suggest(tag, plugins.chain(values::TAGS).chain(STRUCTURE)),
+                    }
                 }
             })?;
         if kind == Kind::Scene {

@@ -244,7 +244,7 @@ fn every_malformed_scene_is_told_what_is_wrong_with_it() {
         (
             "<scene version='3.0.0'></sceen>",
             "1:24",
-            "expected 'scene' tag, not 'sceen'",
+            "<scene> is still open at </sceen>: close it by </scene>",
         ),
         (
             "<scene version='3.0.0'/><scene/>",

@@ -43,7 +43,9 @@ impl Reader {
         let mut mark = [0; MARK.len()];
         input.read_exact(&mut mark).map_err(|e| refused(path, &e))?;
         if &mark != MARK {
-            return Err(damaged(path, "it does not begin like one"));
+            let message = format!("{} is no part: it does not begin like one", path.display());
+            let error = Error::input(message);
+            return Err(error.help("parts are what `etendue render -o NAME.part` writes"));
         }
         let head: Head = json(path, &mut input, length)?;
         if !head.is_sound() {
