@@ -129,7 +129,15 @@ impl Brightness {
                 .unzip();
             Discrete::new(floored(&weights, &areas, &sums)).map(Places::Triangles)
         } else {
-            return (look(&Interaction::at_uv(Vec2::splat(0.5))), None);
+            // What is drawn of it will do for choosing lights.
+            let beside = shape.bounds(0).min - 1.0;
+            for i in 0..*TRIANGLE_PROBES.end() {
+                let u = Vec2::new(0.754_877_7, 0.569_840_3) * (i as f32 + 0.5);
+                if let Some(point) = shape.sample(beside, u - u.floor()) {
+                    sums.add(1.0, look(&interaction(shape, &point)));
+                }
+            }
+            return (sums.mean(), None);
         };
         let share = sums.unevenness();
         let density = places.filter(|_| share > EVEN).map(|places| Self {

@@ -2,17 +2,21 @@
 //! curve; `to_world` moves the points and leaves the radii. A tube is what a circle sweeps that stands at right angles to
 //! the curve; it has no ends, and only its outside is met, so that a ray inside of it leaves. Texture coordinates are
 //! the angle around the curve, from where its z is greatest a quarter turn before, and the place along all curves.
+//! For light a segment is drawn by its area, and a place evenly along it and around it, whose density is known.
 //! A hit is found by going from cone to cone along the curve (Reshetov and Luebke, *Phantom Ray-Hair Intersector*,
 //! 2018), in pieces that are nearly straight and in double precision.
 
-use glam::{DMat4, DVec3, DVec4};
+use std::f64::consts::TAU;
 
-use super::curves::{Basis, Curves, OnTube, around_balls, read};
-use super::{Bounds, Geometry, Shape, Surface};
+use glam::{DMat4, DVec3, DVec4, Vec2, Vec3};
+
+use super::curves::{Basis, Curves, OnTube, around_balls, read, turned};
+use super::{Bounds, Geometry, Shape, Surface, SurfaceSample, area_to_solid_angle};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, file};
 use crate::error::Result;
 use crate::interaction::{Hit, Interaction, Ray};
+use crate::math::distribution::Discrete;
 
 /// B-splines in world space. A primitive is a segment of four control points.
 #[derive(Debug)]
@@ -290,6 +294,97 @@ impl BsplineCurves {
     }
 }
 
+/// Places along a segment at which Gauss and Legendre sum up, and their weights (Abramowitz and Stegun, 25.4.29).
+const GAUSS: [(f64, f64); 4] = [
+    (0.069_431_844_202_973_7, 0.173_927_422_568_726_9),
+    (0.330_009_478_207_571_9, 0.326_072_577_431_273_1),
+    (0.669_990_521_792_428_1, 0.326_072_577_431_273_1),
+    (0.930_568_155_797_026_3, 0.173_927_422_568_726_9),
+];
+/// Places around a tube at which its area is summed up.
+const AROUND: u16 = 8;
+
+impl BsplineCurves {
+    /// The place at a parameter of a segment, in the direction that `out` makes of the curve's own: at right angles to
+    /// it, of unit length. The normal's length is that of the derivative along the curve, times the area that a radian
+    /// around it and a unit of the parameter cover.
+    #[inline]
+    fn at(&self, segment: u32, u: f32, out: impl FnOnce(DVec3) -> DVec3) -> OnTube {
+        let points = bezier(self.curves.segment(segment));
+        let [c, d, dd, ddd] = at(&points, f64::from(u));
+        let (center, first) = (c.truncate(), d.truncate());
+        let (second, third) = (dd.truncate(), ddd.truncate());
+        let speed = first.length();
+        let along = first / speed;
+        let out = out(along);
+        let radial = c.w * out;
+        let normal = (speed * speed - radial.dot(second)) * radial - d.w * c.w * first;
+        // Along the curve the angle is that from the curve's own normal, which turns with its torsion.
+        let binormal = first.cross(second);
+        let is_twisted = binormal.length() > 1e-6 && third.length() > 1e-6;
+        let torsion = match is_twisted {
+            true => third.dot(binormal) / binormal.length_squared(),
+            false => 0.0,
+        };
+        let turned = torsion * speed * along.cross(out) - out.dot(second) / speed * along;
+        OnTube {
+            center,
+            position: center + radial,
+            along,
+            normal,
+            dp_dv: first + d.w * out + c.w * turned,
+            u,
+        }
+    }
+
+    /// The place at a parameter of a segment that lies in the direction of a position.
+    fn toward(&self, segment: u32, u: f32, position: DVec3) -> OnTube {
+        let [c, ..] = at(&bezier(self.curves.segment(segment)), f64::from(u));
+        self.at(segment, u, |along| {
+            let way = position - c.truncate();
+            (way - way.dot(along) * along).normalize_or(along.any_orthonormal_vector())
+        })
+    }
+
+    /// The place of a point on the tube.
+    fn near(&self, point: &SurfaceSample) -> OnTube {
+        self.toward(
+            point.primitive,
+            point.barycentric.x,
+            point.position.as_dvec3(),
+        )
+    }
+
+    /// How much area a turn around a segment and the whole of its parameter cover, if they do as at this place.
+    fn stretch(&self, segment: u32, at: &OnTube) -> f64 {
+        let [_, d, ..] = self::at(&bezier(self.curves.segment(segment)), f64::from(at.u));
+        TAU * at.normal.length() / d.truncate().length()
+    }
+
+    fn areas(&self) -> Option<&Discrete> {
+        self.curves.areas(|segment| {
+            let mut sum = 0.0;
+            for (u, weight) in GAUSS {
+                for i in 0..AROUND {
+                    let turns = f32::from(i) / f32::from(AROUND);
+                    let at = self.at(segment, u as f32, |along| turned(along, turns));
+                    sum += weight * self.stretch(segment, &at) / f64::from(AROUND);
+                }
+            }
+            sum
+        })
+    }
+
+    /// With which density per solid angle a point is drawn.
+    fn density(&self, from: Vec3, point: &SurfaceSample, at: &OnTube) -> f32 {
+        let segment = point.primitive;
+        let probability = (self.areas()).map_or(0.0, |areas| areas.probability(segment as usize));
+        let area = self.stretch(segment, at) / probability;
+        let pdf = area_to_solid_angle(area, from, point.position, point.normal);
+        if pdf.is_finite() { pdf } else { 0.0 }
+    }
+}
+
 impl Surface for BsplineCurves {
     fn primitive_count(&self) -> u32 {
         self.curves.count()
@@ -306,33 +401,37 @@ impl Surface for BsplineCurves {
     }
 
     fn interaction(&self, ray: &Ray, hit: &Hit) -> Interaction<'_> {
-        let points = bezier(self.curves.segment(self.curves.segment_of(hit)));
-        let [c, d, dd, ddd] = at(&points, f64::from(hit.u));
-        let (center, first) = (c.truncate(), d.truncate());
-        let (second, third) = (dd.truncate(), ddd.truncate());
-        let speed = first.length();
-        let along = first / speed;
-        let way = ray.origin.as_dvec3() + f64::from(hit.t) * ray.direction.as_dvec3() - center;
-        let out = (way - way.dot(along) * along).normalize_or(along.any_orthonormal_vector());
-        let radial = c.w * out;
-        let normal = (speed * speed - radial.dot(second)) * radial - d.w * c.w * first;
-        // Along the curve the angle is that from the curve's own normal, which turns with its torsion.
-        let binormal = first.cross(second);
-        let is_twisted = binormal.length() > 1e-6 && third.length() > 1e-6;
-        let torsion = match is_twisted {
-            true => third.dot(binormal) / binormal.length_squared(),
-            false => 0.0,
-        };
-        let turned = torsion * speed * along.cross(out) - out.dot(second) / speed * along;
-        let on_tube = OnTube {
-            center,
-            position: center + radial,
-            along,
-            normal,
-            dp_dv: first + d.w * out + c.w * turned,
-            u: hit.u,
-        };
+        let way = ray.origin.as_dvec3() + f64::from(hit.t) * ray.direction.as_dvec3();
+        let on_tube = self.toward(self.curves.segment_of(hit), hit.u, way);
         self.curves.interaction(ray, hit, &on_tube)
+    }
+
+    fn area(&self) -> f64 {
+        self.areas().map_or(0.0, Discrete::total)
+    }
+
+    fn sample(&self, from: Vec3, u: Vec2) -> Option<SurfaceSample> {
+        let drawn = self.areas()?.sample(u.x);
+        let segment = drawn.index as u32;
+        let at = self.at(segment, u.y, |along| turned(along, drawn.rest));
+        let point = at.drawn(segment);
+        let pdf = self.density(from, &point, &at);
+        (pdf > 0.0).then_some(SurfaceSample { pdf, ..point })
+    }
+
+    fn uv(&self, point: &SurfaceSample) -> Vec2 {
+        self.curves.uv(point.primitive, &self.near(point))
+    }
+
+    fn pdf(&self, from: Vec3, at: &Interaction<'_>) -> f32 {
+        let point = SurfaceSample {
+            position: at.position,
+            normal: at.normal,
+            primitive: at.primitive,
+            barycentric: at.barycentric,
+            pdf: 0.0,
+        };
+        self.density(from, &point, &self.near(&point))
     }
 
     fn bytes(&self) -> usize {

@@ -420,3 +420,97 @@ fn a_ray_meets_a_tube_where_it_first_comes_within_the_radius() {
         );
     }
 }
+
+/// A place in [0, 1)², the `i`th of a sequence.
+fn pair(seed: u64, i: u32) -> Vec2 {
+    Vec2::new(
+        random::unit(random::bits(seed, 2 * i)),
+        random::unit(random::bits(seed, 2 * i + 1)),
+    )
+}
+
+/// Straight tubes of a radius that changes evenly, and one that has no length.
+#[test]
+fn tubes_have_the_areas_of_cylinders_cones_and_balls() {
+    use std::f64::consts::PI;
+    let cone = (1.0 - 0.1_f64 * 0.1).sqrt();
+    for (plugin, text, area) in [
+        (
+            "bsplinecurve",
+            "0 0 0 .2\n1 0 0 .2\n2 0 0 .2\n3 0 0 .2\n4 0 0 .2\n",
+            0.8 * PI,
+        ),
+        (
+            "bsplinecurve",
+            "0 0 0 .1\n1 0 0 .2\n2 0 0 .3\n3 0 0 .4\n",
+            0.5 * PI * 1.01_f64.sqrt(),
+        ),
+        ("linearcurve", "0 0 0 .2\n1 0 0 .2\n", 0.4 * PI + 0.16 * PI),
+        (
+            "linearcurve",
+            "0 0 0 .2\n0 1 0 .3\n",
+            0.5 * PI * cone * cone + 2.0 * PI * (0.04 * 0.9 + 0.09 * 1.1),
+        ),
+        (
+            "linearcurve",
+            "0 0 0 .2\n0 0.05 0 .3\n",
+            4.0 * PI * (0.04 + 0.09),
+        ),
+    ] {
+        let found = curves(plugin, text, "").area();
+        assert!((found / area - 1.0).abs() < 1e-6, "{text}: {found} {area}");
+    }
+}
+
+/// The mean of the reciprocal density, where nothing is in between, is the solid angle that rays in even directions find;
+/// and a point that a ray meets has the density with which it was drawn.
+#[test]
+fn points_are_drawn_on_tubes_with_the_density_that_is_told() {
+    let plugin = "bsplinecurve";
+    let tubes = curves(plugin, TEXT, "");
+    for from in [DVec3::new(1.0, 2.0, 0.5), DVec3::new(1.2, 0.9, 0.1)] {
+        let n = 20_000_u32;
+        let (mut drawn, mut squared, mut found) = (0.0, 0.0, 0.0);
+        for i in 0..n {
+            let direction = lanes::warp::uniform_sphere::<f32>(pair(7, i).into());
+            let direction = Vec3::from(direction).as_dvec3();
+            found += f64::from(u8::from(meet(&tubes, &ray(from, direction)).is_some()));
+            let Some(point) = tubes.sample(from.as_vec3(), pair(3, i)) else {
+                continue;
+            };
+            let way = point.position.as_dvec3() - from;
+            let Some(at) = meet(&tubes, &ray(from, way)) else {
+                continue;
+            };
+            if (f64::from(at.t) / way.length() - 1.0).abs() > 1e-4 {
+                continue;
+            }
+            assert!(point.normal.dot(at.normal) > 0.999, "{plugin}");
+            let pdf = tubes.pdf(from.as_vec3(), &at);
+            let cosine = -point.normal.as_dvec3().dot(way.normalize());
+            if cosine > 0.3 {
+                assert!(
+                    (pdf / point.pdf - 1.0).abs() < 0.05,
+                    "{plugin}: {pdf} {}",
+                    point.pdf
+                );
+                assert!((tubes.uv(&point).y - at.uv.y).abs() < 1e-2, "{plugin}");
+            }
+            drawn += f64::from(1.0 / point.pdf);
+            squared += f64::from(1.0 / point.pdf).powi(2);
+        }
+        let n = f64::from(n);
+        let whole = 4.0 * std::f64::consts::PI;
+        let (share, mean) = (found / n, drawn / n);
+        let errors = [
+            (squared / n - mean * mean) / n,
+            whole * whole * share * (1.0 - share) / n,
+        ];
+        let error = errors.iter().sum::<f64>().sqrt();
+        assert!(
+            (mean - whole * share).abs() < 4.0 * error && error < 0.1 * mean,
+            "{plugin} from {from}: {mean} {} ± {error}",
+            whole * share
+        );
+    }
+}

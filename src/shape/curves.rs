@@ -4,11 +4,14 @@
 
 mod read;
 
+use std::sync::OnceLock;
+
 use glam::{DVec3, DVec4, Vec2, Vec3, Vec4};
 
-use super::Bounds;
+use super::{Bounds, SurfaceSample};
 use crate::interaction::{Hit, Interaction, Ray, offset};
 use crate::math::Frame;
+use crate::math::distribution::Discrete;
 
 pub(super) use read::read;
 
@@ -28,6 +31,8 @@ pub(super) struct Curves {
     points: Vec<Vec4>,
     /// The first control point of each segment.
     segments: Vec<u32>,
+    /// Over segments, by area; made when light is first drawn.
+    areas: OnceLock<Option<Discrete>>,
 }
 
 /// A place on a tube.
@@ -44,6 +49,25 @@ pub(super) struct OnTube {
     pub(super) dp_dv: DVec3,
     /// Where on the segment.
     pub(super) u: f32,
+}
+
+impl OnTube {
+    /// Unit length.
+    fn normal(&self) -> Vec3 {
+        let out = (self.position - self.center).normalize_or_zero();
+        self.normal.normalize_or(out).as_vec3()
+    }
+
+    /// As a point that was drawn, without a density.
+    pub(super) fn drawn(&self, segment: u32) -> SurfaceSample {
+        SurfaceSample {
+            position: self.position.as_vec3(),
+            normal: self.normal(),
+            primitive: segment,
+            barycentric: Vec2::new(self.u, 0.0),
+            pdf: 0.0,
+        }
+    }
 }
 
 impl Curves {
@@ -65,18 +89,29 @@ impl Curves {
         before.is_some_and(|before| before + 1 == self.segments[segment as usize])
     }
 
-    /// What a hit on a tube looks like. u goes around the curve from the direction at right angles to z, v along all
-    /// curves.
-    pub(super) fn interaction(&self, ray: &Ray, hit: &Hit, at: &OnTube) -> Interaction<'static> {
-        let radial = at.position - at.center;
+    /// Segments in proportion to their area, which `area` tells; `None` where there is none.
+    pub(super) fn areas(&self, area: impl Fn(u32) -> f64) -> Option<&Discrete> {
+        let build = || Discrete::new((0..self.count()).map(area));
+        self.areas.get_or_init(build).as_ref()
+    }
+
+    /// Texture coordinates. u goes around the curve from the direction at right angles to z, v along all curves.
+    pub(super) fn uv(&self, segment: u32, at: &OnTube) -> Vec2 {
+        let out = (at.position - at.center).normalize_or_zero();
         let (rot, rad) = around(at.along);
-        let out = radial.normalize_or_zero();
         let angle = out.dot(rot).atan2(out.dot(rad)) / std::f64::consts::TAU;
         let angle = if angle < 0.0 { angle + 1.0 } else { angle };
+        let v = (f64::from(at.u) + f64::from(segment)) / f64::from(self.count());
+        Vec2::new(angle as f32, v as f32)
+    }
+
+    /// What a hit on a tube looks like; its first barycentric coordinate is the place on the segment.
+    pub(super) fn interaction(&self, ray: &Ray, hit: &Hit, at: &OnTube) -> Interaction<'static> {
+        let radial = at.position - at.center;
         let count = f64::from(self.count());
         let segment = self.segment_of(hit);
         let dp_du = (std::f64::consts::TAU * at.along.cross(radial)).as_vec3();
-        let normal = at.normal.normalize_or(out).as_vec3();
+        let normal = at.normal();
         let frame = Frame::along(normal, dp_du);
         Interaction {
             t: hit.t,
@@ -84,10 +119,7 @@ impl Curves {
             error: rounding(at),
             normal,
             frame,
-            uv: Vec2::new(
-                angle as f32,
-                ((f64::from(at.u) + f64::from(segment)) / count) as f32,
-            ),
+            uv: self.uv(segment, at),
             dp_du,
             dp_dv: (count * at.dp_dv).as_vec3(),
             wi: frame.to_local(-ray.direction),
@@ -95,7 +127,7 @@ impl Curves {
             shape: hit.shape,
             primitive: segment,
             mesh: None,
-            barycentric: Vec2::ZERO,
+            barycentric: Vec2::new(at.u, 0.0),
         }
     }
 
@@ -107,6 +139,13 @@ impl Curves {
     pub(super) fn bytes(&self) -> usize {
         self.points.len() * size_of::<Vec4>() + self.segments.len() * size_of::<u32>()
     }
+}
+
+/// The direction at right angles to a curve that is so many turns around it.
+pub(super) fn turned(along: DVec3, turns: f32) -> DVec3 {
+    let (rot, rad) = around(along);
+    let (sin, cos) = (f64::from(turns) * std::f64::consts::TAU).sin_cos();
+    cos * rad + sin * rot
 }
 
 /// Two directions at right angles to a curve and each other, from which angles around it are told: the first is as near

@@ -2,16 +2,20 @@
 //! `to_world` moves the points and leaves the radii. A curve is what a ball sweeps whose radius changes evenly from point
 //! to point: cones that touch the balls at their ends (Han et al., *Ray Tracing Generalized Tube Primitives*, 2019). Only
 //! the outside is met, and nothing of a segment that is inside its neighbours. Texture coordinates are the angle around
-//! the line and the place along all curves.
+//! the line and the place along all curves. For light all of it is drawn evenly, and what is inside a neighbour with it:
+//! no ray gets there.
 
-use glam::{DMat4, DVec3, DVec4};
+use std::f64::consts::TAU;
 
-use super::curves::{Basis, Curves, OnTube, around_balls, read};
-use super::{Bounds, Geometry, Shape, Surface};
+use glam::{DMat4, DVec3, DVec4, Vec2, Vec3};
+
+use super::curves::{Basis, Curves, OnTube, around_balls, read, turned};
+use super::{Bounds, Geometry, Shape, Surface, SurfaceSample, area_to_solid_angle};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, file};
 use crate::error::Result;
 use crate::interaction::{Hit, Interaction, Ray};
+use crate::math::distribution::Discrete;
 
 /// Lines in world space. A primitive is a segment: its cone, the ball at its end, and the one at the curve's start.
 #[derive(Debug)]
@@ -164,6 +168,84 @@ impl LinearCurves {
     }
 }
 
+impl LinearCurves {
+    /// The place whose normal begins at `foot` on the axis and goes `out`.
+    fn at(&self, segment: u32, foot: f32, out: DVec3) -> OnTube {
+        let [a, b] = self.curves.segment(segment);
+        let ball = a + f64::from(foot) * (b - a);
+        let (center, axis) = (ball.truncate(), (b - a).truncate());
+        OnTube {
+            center,
+            position: center + ball.w * out,
+            along: axis.normalize_or(DVec3::X),
+            normal: out,
+            dp_dv: axis + (b.w - a.w) * out,
+            u: foot,
+        }
+    }
+
+    /// The place with its foot there that lies in the direction of a position.
+    fn toward(&self, segment: u32, foot: f32, position: DVec3) -> OnTube {
+        let [a, b] = self.curves.segment(segment);
+        let center = (a + f64::from(foot) * (b - a)).truncate();
+        let out = (position - center).normalize_or(DVec3::Z);
+        self.at(segment, foot, out)
+    }
+
+    /// The areas of a segment's side, of the ball at its end and of that at its start, as far as the side does not hold
+    /// them.
+    fn parts(&self, segment: u32) -> [f64; 3] {
+        let [a, b] = self.curves.segment(segment);
+        let cone = Cone::new([a, b]);
+        let ball = |radius: f64, share: f64| 2.0 * TAU * radius.max(0.0).powi(2) * share;
+        let (side, end, start) = match cone.spread > 0.0 {
+            true => {
+                let length = cone.axis.length();
+                let side = 0.5 * TAU * (a.w + b.w) * cone.spread / length;
+                let steep = cone.growth / length;
+                (side, 0.5 * (1.0 + steep), 0.5 * (1.0 - steep))
+            }
+            false => (0.0, 1.0, 1.0),
+        };
+        let start = if self.curves.follows(segment) {
+            0.0
+        } else {
+            start
+        };
+        [side, ball(b.w, end), ball(a.w, start)]
+    }
+
+    fn areas(&self) -> Option<&Discrete> {
+        self.curves
+            .areas(|segment| self.parts(segment).iter().sum())
+    }
+
+    /// A place drawn evenly over a segment: its foot, and the normal there.
+    fn draw(&self, segment: u32, u: Vec2) -> Option<(f64, DVec3)> {
+        let part = Discrete::new(self.parts(segment))?.sample(u.x);
+        let (rest, [a, b]) = (f64::from(part.rest), self.curves.segment(segment));
+        let cone = Cone::new([a, b]);
+        let along = cone.axis.normalize_or(DVec3::X);
+        let steep = match cone.spread > 0.0 {
+            true => cone.growth / cone.axis.length(),
+            false => 0.0,
+        };
+        let (foot, cos) = match (part.index, cone.spread > 0.0) {
+            // In proportion to the radius, which changes evenly.
+            (0, _) => {
+                let squared = a.w * a.w + rest * (b.w * b.w - a.w * a.w);
+                (rest * (a.w + b.w) / (a.w + squared.max(0.0).sqrt()), -steep)
+            }
+            (1, true) => (1.0, -steep + rest * (1.0 + steep)),
+            (_, true) => (0.0, -steep - rest * (1.0 - steep)),
+            (1, false) => (1.0, 2.0 * rest - 1.0),
+            (_, false) => (0.0, 2.0 * rest - 1.0),
+        };
+        let sin = (1.0 - cos * cos).max(0.0).sqrt();
+        Some((foot, cos * along + sin * turned(along, u.y)))
+    }
+}
+
 impl Surface for LinearCurves {
     fn primitive_count(&self) -> u32 {
         self.curves.count()
@@ -179,21 +261,33 @@ impl Surface for LinearCurves {
     }
 
     fn interaction(&self, ray: &Ray, hit: &Hit) -> Interaction<'_> {
-        let [a, b] = self.curves.segment(self.curves.segment_of(hit));
-        let foot = f64::from(hit.u);
-        let ball = a + foot * (b - a);
-        let (center, axis) = (ball.truncate(), (b - a).truncate());
         let place = ray.origin.as_dvec3() + f64::from(hit.t) * ray.direction.as_dvec3();
-        let out = (place - center).normalize_or(DVec3::Z);
-        let on_tube = OnTube {
-            center,
-            position: center + ball.w * out,
-            along: axis.normalize_or(DVec3::X),
-            normal: out,
-            dp_dv: axis + (b.w - a.w) * out,
-            u: hit.u,
-        };
+        let on_tube = self.toward(self.curves.segment_of(hit), hit.u, place);
         self.curves.interaction(ray, hit, &on_tube)
+    }
+
+    fn area(&self) -> f64 {
+        self.areas().map_or(0.0, Discrete::total)
+    }
+
+    fn sample(&self, from: Vec3, u: Vec2) -> Option<SurfaceSample> {
+        let areas = self.areas()?;
+        let drawn = areas.sample(u.x);
+        let segment = drawn.index as u32;
+        let (foot, out) = self.draw(segment, Vec2::new(drawn.rest, u.y))?;
+        let point = self.at(segment, foot as f32, out).drawn(segment);
+        let pdf = area_to_solid_angle(areas.total(), from, point.position, point.normal);
+        (pdf > 0.0 && pdf.is_finite()).then_some(SurfaceSample { pdf, ..point })
+    }
+
+    fn uv(&self, point: &SurfaceSample) -> Vec2 {
+        let (segment, foot) = (point.primitive, point.barycentric.x);
+        let at = self.toward(segment, foot, point.position.as_dvec3());
+        self.curves.uv(segment, &at)
+    }
+
+    fn pdf(&self, from: Vec3, at: &Interaction<'_>) -> f32 {
+        area_to_solid_angle(self.area(), from, at.position, at.normal)
     }
 
     fn bytes(&self) -> usize {

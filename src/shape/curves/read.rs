@@ -73,6 +73,7 @@ fn parse(text: &[u8], path: &Path, to_world: &DMat4, basis: Basis) -> Result<Tex
         curves: Curves {
             points: Vec::new(),
             segments: Vec::new(),
+            areas: Default::default(),
         },
         curve: None,
     };
