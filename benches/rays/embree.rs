@@ -16,6 +16,7 @@ use libloading::Library;
 use crate::meshes::triangles;
 use crate::peer::{Built, Maker, Peer};
 use crate::rays::{Batch, Question};
+use crate::strands::Strands;
 
 /// `RTCRay`.
 #[repr(C, align(16))]
@@ -166,7 +167,22 @@ pub(crate) fn makers(embree: &Arc<Embree>) -> Vec<Maker> {
         let embree = embree.clone();
         let build = move |geometry: &Arc<Geometry>, threads| {
             let device = Device::new(&embree, threads)?;
-            let (scene, seconds) = Scene::build(device, geometry, quality, flags)?;
+            /// `RTC_GEOMETRY_TYPE_TRIANGLE`.
+            const TRIANGLE: c_int = 0;
+            let mesh = triangles(geometry);
+            // The spare last vertex is not counted, so that sixteen bytes can be read at any that is.
+            let vertices = mesh.positions.len() - 1;
+            let arrays = Arrays {
+                kind: TRIANGLE,
+                indices: (
+                    0x5003,
+                    mesh.triangles.as_ptr().cast(),
+                    12,
+                    mesh.triangles.len(),
+                ),
+                vertices: (0x9003, mesh.positions.as_ptr().cast(), 12, vertices),
+            };
+            let (scene, seconds) = Scene::build(device, &arrays, geometry.clone(), quality, flags)?;
             let bytes = scene.device.bytes.load(Ordering::Relaxed).max(0) as usize;
             let scene = Arc::new(scene);
             let mut peers: Vec<Box<dyn Peer>> = Vec::new();
@@ -191,6 +207,33 @@ pub(crate) fn makers(embree: &Arc<Embree>) -> Vec<Maker> {
         maker("Embree robust", HIGH, ROBUST, true),
         maker("Embree medium", MEDIUM, 0, false),
     ]
+}
+
+/// The ways to trace round B-splines.
+pub(crate) fn strands(
+    embree: &Arc<Embree>,
+    strands: &Arc<Strands>,
+    threads: usize,
+) -> Result<Built, String> {
+    /// `RTC_GEOMETRY_TYPE_ROUND_BSPLINE_CURVE`.
+    const ROUND_BSPLINE: c_int = 32;
+    let (points, segments) = (&strands.points, &strands.segments);
+    let device = Device::new(embree, threads)?;
+    let arrays = Arrays {
+        kind: ROUND_BSPLINE,
+        indices: (0x5001, segments.as_ptr().cast(), 4, segments.len()),
+        vertices: (0x9004, points.as_ptr().cast(), 16, points.len()),
+    };
+    let (scene, seconds) = Scene::build(device, &arrays, strands.clone(), HIGH, 0)?;
+    let bytes = scene.device.bytes.load(Ordering::Relaxed).max(0) as usize;
+    let scene = Arc::new(scene);
+    let packets = Packets(scene.clone(), "Embree");
+    let peers: Vec<Box<dyn Peer>> = vec![Box::new(Single(scene, "Embree")), Box::new(packets)];
+    Ok(Built {
+        peers,
+        seconds,
+        bytes,
+    })
 }
 
 struct Device {
@@ -240,12 +283,22 @@ impl Drop for Device {
     }
 }
 
-/// A committed scene of one mesh.
+/// A buffer: format, rows, bytes of a row, and how many.
+type Rows = (c_int, *const c_void, usize, usize);
+
+/// What a geometry is made of.
+struct Arrays {
+    kind: c_int,
+    indices: Rows,
+    vertices: Rows,
+}
+
+/// A committed scene of one geometry.
 struct Scene {
     handle: Handle,
     device: Device,
     /// Whose arrays the scene reads.
-    _geometry: Arc<Geometry>,
+    _owner: Arc<dyn Send + Sync>,
 }
 
 // SAFETY: a committed scene is only read, which Embree allows from many threads.
@@ -254,38 +307,31 @@ unsafe impl Send for Scene {}
 unsafe impl Sync for Scene {}
 
 impl Scene {
-    /// The scene, and the seconds that committing it took.
+    /// The scene, and the seconds that committing it took. `owner` holds the arrays.
     fn build(
         device: Device,
-        geometry: &Arc<Geometry>,
+        arrays: &Arrays,
+        owner: Arc<dyn Send + Sync>,
         quality: c_int,
         flags: c_int,
     ) -> Result<(Self, f64), String> {
-        /// `RTC_GEOMETRY_TYPE_TRIANGLE`, and for each buffer its type and format.
-        const TRIANGLE: c_int = 0;
-        const INDICES: (c_int, c_int) = (0, 0x5003);
-        const VERTICES: (c_int, c_int) = (1, 0x9003);
-        let mesh = triangles(geometry);
+        /// `RTC_BUFFER_TYPE_INDEX` and `RTC_BUFFER_TYPE_VERTEX`.
+        const INDICES: c_int = 0;
+        const VERTICES: c_int = 1;
         let call = &device.embree.0;
         // SAFETY: the handles are those that the library gave, and each is released once. The buffers
-        // are rows of twelve bytes that stay with `_geometry`; the mesh's spare last vertex is not
-        // counted, so that sixteen bytes can be read at any that is.
+        // stay with `_owner`, and sixteen bytes can be read at any vertex.
         let (handle, seconds, error) = unsafe {
             let scene = (call.rtcNewScene)(device.handle);
             (call.rtcSetSceneBuildQuality)(scene, quality);
             (call.rtcSetSceneFlags)(scene, flags);
-            let shape = (call.rtcNewGeometry)(device.handle, TRIANGLE);
+            let shape = (call.rtcNewGeometry)(device.handle, arrays.kind);
             (call.rtcSetGeometryBuildQuality)(shape, quality);
-            let share = |(kind, format), rows: *const c_void, count| {
-                (call.rtcSetSharedGeometryBuffer)(shape, kind, 0, format, rows, 0, 12, count);
+            let share = |kind, (format, rows, bytes, count): Rows| {
+                (call.rtcSetSharedGeometryBuffer)(shape, kind, 0, format, rows, 0, bytes, count);
             };
-            let vertices = mesh.positions.len() - 1;
-            share(VERTICES, mesh.positions.as_ptr().cast(), vertices);
-            share(
-                INDICES,
-                mesh.triangles.as_ptr().cast(),
-                mesh.triangles.len(),
-            );
+            share(VERTICES, arrays.vertices);
+            share(INDICES, arrays.indices);
             (call.rtcCommitGeometry)(shape);
             (call.rtcAttachGeometry)(scene, shape);
             (call.rtcReleaseGeometry)(shape);
@@ -297,7 +343,7 @@ impl Scene {
         let scene = Self {
             handle,
             device,
-            _geometry: geometry.clone(),
+            _owner: owner,
         };
         match error {
             0 => Ok((scene, seconds)),

@@ -22,6 +22,7 @@ mod ours;
 mod peer;
 mod rays;
 mod report;
+mod strands;
 mod watertight;
 
 use std::process::ExitCode;
@@ -64,6 +65,10 @@ fn run(arguments: &Arguments) -> Result<(), String> {
             let misses = watertight::misses(&makers, arguments.rays())?;
             report::print_misses(&misses);
             report.watertight = Some(misses);
+        } else if name == Named::Strands {
+            let measured = strands::measure(embree.as_ref(), arguments)?;
+            report::print_mesh(&measured);
+            report.meshes.push(measured);
         } else if let Some(geometry) = meshes::load(name)? {
             let measured = measure::mesh(name, &geometry, &makers, arguments)?;
             report::print_mesh(&measured);

@@ -6,14 +6,15 @@ use std::sync::{Arc, Barrier};
 use std::thread;
 use std::time::Instant;
 
-use etendue::interaction::Hit;
+use etendue::interaction::{Hit, Ray};
 use etendue::shape::Geometry;
+use glam::{DVec3, Vec3};
 
 use crate::arguments::Arguments;
 use crate::meshes::{Named, triangles};
 use crate::ours;
 use crate::peer::{Maker, Peer};
-use crate::rays::{Batch, Question, Set, sets};
+use crate::rays::{Batch, Question, Set, Stage, sets};
 use crate::report::{BuildRow, BuildTime, Differences, MeshReport, Ratio, Row, SetReport, Speed};
 
 /// Builds, traces and compares.
@@ -29,7 +30,18 @@ pub(crate) fn mesh(
         builds.push(row);
         peers.extend(made);
     }
-    let sets = sets(geometry, &*peers[0], arguments.rays());
+    let mesh = triangles(geometry);
+    let normal = |ray: &Ray, hit: &Hit| {
+        let corners = mesh.corners(&mesh.triangles[hit.primitive as usize]);
+        let [a, b, c] = corners.map(Vec3::as_dvec3);
+        let normal = (b - a).cross(c - a).normalize_or(DVec3::Z).as_vec3();
+        normal * -normal.dot(ray.direction).signum()
+    };
+    let stage = Stage {
+        bounds: mesh.bounds().expect("the mesh is not empty"),
+        normal: &normal,
+    };
+    let sets = sets(&stage, &*peers[0], arguments.rays());
     let (mut reports, mut gains) = (Vec::new(), Vec::new());
     for set in sets.iter().filter(|set| !set.rays.is_empty()) {
         let answering = peers.iter().filter(|p| p.answers(set.question));
@@ -38,7 +50,8 @@ pub(crate) fn mesh(
     }
     Ok(MeshReport {
         name: name.name(),
-        triangles: triangles(geometry).triangles.len(),
+        primitives: "triangles",
+        triangles: mesh.triangles.len(),
         rays: arguments.rays(),
         rounds: arguments.repeat,
         builds,
@@ -90,7 +103,7 @@ fn build(
 }
 
 /// All rounds of one set. Ratios are to the first tracer that is Embree's, else to the first of others.
-fn race(set: &Set, peers: &[&dyn Peer], rounds: u32, gains: &mut Vec<f64>) -> SetReport {
+pub(crate) fn race(set: &Set, peers: &[&dyn Peer], rounds: u32, gains: &mut Vec<f64>) -> SetReport {
     let batches = set.batches();
     let answers: Vec<Answers> = peers
         .iter()

@@ -22,18 +22,21 @@ pub(crate) enum Named {
     Hair,
     /// 10 M triangles, generated
     Terrain,
+    /// 2 M segments of curves, generated
+    Strands,
     /// Rays at the vertices and edges of a closed surface: who misses it?
     Watertight,
 }
 
 impl Named {
     /// In the order of the report.
-    pub(crate) const ALL: [Self; 6] = [
+    pub(crate) const ALL: [Self; 7] = [
         Self::Bunny,
         Self::Dragon,
         Self::Crown,
         Self::Hair,
         Self::Terrain,
+        Self::Strands,
         Self::Watertight,
     ];
 
@@ -45,6 +48,7 @@ impl Named {
             Self::Crown => "crown",
             Self::Hair => "hair",
             Self::Terrain => "terrain",
+            Self::Strands => "strands",
             Self::Watertight => "watertight",
         }
     }
@@ -59,6 +63,7 @@ pub(crate) fn load(name: Named) -> Result<Option<Arc<Geometry>>, String> {
         Named::Hair => Some(mesh::hair(2_000_000, 1)),
         Named::Terrain => Some(mesh::terrain(10_000_000, 1)),
         Named::Watertight => Some(mesh::bumpy_sphere(7, 1)),
+        Named::Strands => None, // no mesh
     };
     if mesh.is_none() {
         println!(

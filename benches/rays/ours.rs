@@ -35,6 +35,11 @@ pub(crate) fn tracer(geometry: &Arc<Geometry>) -> Tracer {
     Tracer::new(vec![geometry.clone()], &[0], Vec::new(), Method::Tree)
 }
 
+/// As a peer.
+pub(crate) fn peer(tracer: Tracer) -> Box<dyn Peer> {
+    Box::new(Ours(tracer))
+}
+
 struct Ours(Tracer);
 
 impl Peer for Ours {

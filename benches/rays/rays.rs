@@ -5,13 +5,10 @@
 //! any-hit rays, by turns toward a light and, for ambient occlusion, in a cosine-distributed direction; and
 //! the first bounce; from that one's hits the second.
 
-use etendue::interaction::Ray;
+use etendue::interaction::{Hit, Ray};
 use etendue::math::{Frame, random, warp};
-use etendue::mesh::Mesh;
-use etendue::shape::Geometry;
-use glam::{DVec3, Vec2, Vec3};
+use glam::{Vec2, Vec3};
 
-use crate::meshes::triangles;
 use crate::peer::Peer;
 
 /// Rays of a batch: as many camera rays as the renderer traces at a time in RGB, in whole packets.
@@ -91,9 +88,17 @@ fn packet(rays: &[Ray]) -> Packet {
     }
 }
 
+/// What rays are made for.
+pub(crate) struct Stage<'t> {
+    /// Its lowest and highest corner.
+    pub(crate) bounds: (Vec3, Vec3),
+    /// The unit normal where a ray has hit, on the side where it came from.
+    pub(crate) normal: &'t dyn Fn(&Ray, &Hit) -> Vec3,
+}
+
 /// The four sets, of about `count` rays each, from hits that `tracer` finds.
-pub(crate) fn sets(geometry: &Geometry, tracer: &dyn Peer, count: usize) -> Vec<Set> {
-    let scene = Scene::new(triangles(geometry), tracer);
+pub(crate) fn sets(stage: &Stage<'_>, tracer: &dyn Peer, count: usize) -> Vec<Set> {
+    let scene = Scene::new(stage, tracer);
     let primary = scene.primary(count);
     let seen = scene.points(&primary);
     let first = scene.bounce(&seen, count, 1);
@@ -112,7 +117,7 @@ pub(crate) fn sets(geometry: &Geometry, tracer: &dyn Peer, count: usize) -> Vec<
 
 /// A mesh to stand on.
 struct Scene<'t> {
-    mesh: &'t Mesh,
+    normal: &'t dyn Fn(&Ray, &Hit) -> Vec3,
     tracer: &'t dyn Peer,
     center: Vec3,
     /// Of a ball around everything.
@@ -126,10 +131,10 @@ struct Point {
 }
 
 impl<'t> Scene<'t> {
-    fn new(mesh: &'t Mesh, tracer: &'t dyn Peer) -> Self {
-        let (low, high) = mesh.bounds().expect("the mesh is not empty");
+    fn new(stage: &Stage<'t>, tracer: &'t dyn Peer) -> Self {
+        let (low, high) = stage.bounds;
         Self {
-            mesh,
+            normal: stage.normal,
             tracer,
             center: low.midpoint(high),
             radius: 0.5 * low.distance(high),
@@ -163,12 +168,7 @@ impl<'t> Scene<'t> {
         self.tracer.closest(&Batch { rays, packets }, &mut hits);
         let met = rays.iter().zip(&hits).filter(|(_, hit)| !hit.is_miss());
         met.map(|(ray, hit)| {
-            let corners = self
-                .mesh
-                .corners(&self.mesh.triangles[hit.primitive as usize]);
-            let [a, b, c] = corners.map(Vec3::as_dvec3);
-            let normal = (b - a).cross(c - a).normalize_or(DVec3::Z).as_vec3();
-            let normal = normal * -normal.dot(ray.direction).signum();
+            let normal = (self.normal)(ray, hit);
             // Further than any of them rounds, so that all start on the same side.
             let position = ray.at(hit.t) + 2e-5 * self.radius * normal;
             Point { position, normal }

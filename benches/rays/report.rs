@@ -16,6 +16,8 @@ pub(crate) struct Report {
 #[derive(Serialize)]
 pub(crate) struct MeshReport {
     pub(crate) name: &'static str,
+    /// What it is made of.
+    pub(crate) primitives: &'static str,
     pub(crate) triangles: usize,
     /// In each set.
     pub(crate) rays: usize,
@@ -137,9 +139,10 @@ const QUIET: f64 = 1.8;
 pub(crate) fn print_mesh(mesh: &MeshReport) {
     let count = mesh.triangles as f64;
     println!(
-        "\n== {}: {:.0} k triangles, {} rounds",
+        "\n== {}: {:.0} k {}, {} rounds",
         mesh.name,
         count / 1e3,
+        mesh.primitives,
         mesh.rounds
     );
     let gain = mesh.arithmetic_gain;
@@ -152,7 +155,7 @@ pub(crate) fn print_mesh(mesh: &MeshReport) {
     let header = |threads: usize| format!("  {:>11}", format!("{threads} thr., s"));
     let threads = mesh.builds[0].seconds.iter().map(|s| s.threads);
     let header: String = threads.map(header).collect();
-    println!("\n{:NAME$}{header}  bytes a triangle", "build");
+    println!("\n{:NAME$}{header}  bytes a primitive", "build");
     for row in &mesh.builds {
         let seconds = row.seconds.iter().map(|s| format!("  {:>11.3}", s.median));
         let seconds: String = seconds.collect();
