@@ -1,6 +1,6 @@
 //! `constvolume`: one value (1) everywhere.
 
-use super::field::{Field, Placement, TO_WORLD};
+use super::field::{Field, Placement, TO_WORLD, role_of};
 use crate::color::ColorModel;
 use crate::description::Properties;
 use crate::description::declared::{Plugin, texture};
@@ -25,8 +25,9 @@ impl<C: ColorModel> ConstVolume<C> {
     };
 
     pub(super) fn build(properties: &Properties<'_>, palette: &Palette<C>) -> Result<Self> {
+        let role = role_of(properties, "value", palette.role);
         Ok(Self {
-            value: palette.color(properties, "value", palette.role)?,
+            value: palette.color(properties, "value", role)?,
             bounds: Placement::of(properties, glam::DMat4::IDENTITY)?.bounds,
         })
     }

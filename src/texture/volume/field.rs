@@ -67,7 +67,7 @@ impl<C: ColorModel> Volume<C> {
         {
             return Self::build(&child, &palette.with_role(role));
         }
-        let value = palette.color(properties, name, role)?;
+        let value = palette.color(properties, name, role_of(properties, name, role))?;
         Ok(Self::Const(constvolume::ConstVolume::everywhere(value)))
     }
 
@@ -100,6 +100,19 @@ impl<C: ColorModel> Volume<C> {
                 wavelengths,
             }),
         }
+    }
+}
+
+/// What the colour called `name` stands for. As in Mitsuba a triple in [0, 1] becomes the spectrum of a reflectance, also
+/// where it is none, and not a multiple of a darker one's.
+pub(super) fn role_of(properties: &Properties<'_>, name: &str, role: Role) -> Role {
+    match properties.value(name).map(|property| &property.value) {
+        Some(Value::Rgb(rgb))
+            if role == Role::Quantity && rgb.min_element() >= 0.0 && rgb.max_element() <= 1.0 =>
+        {
+            Role::Reflectance
+        }
+        _ => role,
     }
 }
 

@@ -3,7 +3,7 @@ use std::path::Path;
 use glam::Vec3;
 
 use super::*;
-use crate::color::{Rgb, Role, Spectral as _};
+use crate::color::{Bands, Rgb, Role, Spectral as _};
 use crate::description::{Description, Options, Value};
 use crate::image::vol::{Grid, encode};
 use crate::math::{Bounds, Frame};
@@ -172,4 +172,38 @@ fn matrices_are_numbers_by_their_mean_and_no_colours() {
     assert_eq!(number.eval(&at, &())[0], 1.25);
     let error = texture(folder.path(), Rgb).unwrap_err().to_string();
     assert!(error.contains("1 or 3 channels"), "{error}");
+}
+
+/// Mitsuba 3.9.1 `scalar_spectral`: the albedo of a medium, and its extinction.
+#[test]
+fn a_triple_becomes_the_spectrum_of_a_reflectance() {
+    let mut wavelengths = [500.0; 16];
+    wavelengths[..4].copy_from_slice(&[450.0, 550.0, 600.0, 650.0]);
+    for (rgb, expected) in [
+        ("0.99, 0.5, 0.5", [0.50765, 0.5376, 0.80966, 0.94528]),
+        ("1, 0.2, 1", [0.97784, 0.1697, 0.828, 0.99087]),
+    ] {
+        for inside in [
+            format!("<rgb name='albedo' value='{rgb}'/>"),
+            format!(
+                "<volume name='albedo' type='constvolume'><rgb name='value' value='{rgb}'/></volume>"
+            ),
+        ] {
+            let text = format!(
+                "<scene version='3.0.0'><medium type='homogeneous'>{inside}</medium></scene>"
+            );
+            let scene =
+                Description::parse(&text, Path::new("test.xml"), &Options::default()).unwrap();
+            let Value::Object(node) = scene.root().all()[0].value else {
+                panic!("the scene holds a medium");
+            };
+            let palette = Palette::new(Bands::<16>::visible(16).unwrap());
+            let volume = Volume::named(&scene.node(node), "albedo", &palette, Role::Quantity);
+            let volume = volume.unwrap_or_else(|e| panic!("{e}"));
+            let found = Bands::evaluate(volume.constant().unwrap(), &wavelengths);
+            for (i, expected) in expected.into_iter().enumerate() {
+                assert!((found[i] - expected).abs() < 2e-3, "{inside}: {found:?}");
+            }
+        }
+    }
 }
