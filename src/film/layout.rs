@@ -11,6 +11,9 @@ pub(crate) struct Layout {
     names: Vec<String>,
     /// How many are colours.
     colors: usize,
+    /// Whether light also comes to places of the film that no sample was begun at.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    splats: bool,
 }
 
 impl Layout {
@@ -23,7 +26,27 @@ impl Layout {
         Self {
             names,
             colors: count,
+            splats: false,
         }
+    }
+
+    /// The same, with sums of splats where that is so.
+    pub(crate) fn with_splats(self, splats: bool) -> Self {
+        Self { splats, ..self }
+    }
+
+    /// How many sums a pixel has: the weight, one a channel, and for splats the number of paths and one a colour.
+    pub(crate) fn stride(&self) -> usize {
+        let samples = self.count() + 1;
+        match self.splats {
+            true => samples + 1 + self.colors,
+            false => samples,
+        }
+    }
+
+    /// Where among a pixel's sums those of splats are.
+    pub(crate) fn splats(&self) -> Option<Range<usize>> {
+        self.splats.then(|| self.count() + 1..self.stride())
     }
 
     /// Whether it is one that [`Layout::new`] may have made: what was read from a file need not be.

@@ -4,11 +4,13 @@
 mod blocks;
 mod layout;
 mod splat;
+mod splats;
 mod sums;
 
 pub(crate) use blocks::{BLOCK, Blocks, Grid, Record};
 pub(crate) use layout::Layout;
 pub(crate) use splat::{GROUP, Group};
+pub(crate) use splats::Splats;
 pub(crate) use sums::{Accumulator, Summed, Sums, Tally, Times};
 
 use sums::zeros;

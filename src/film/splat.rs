@@ -25,8 +25,8 @@ pub(crate) struct Group {
 }
 
 impl Group {
-    /// Adds the samples to the sums over `window`: for each pixel, row by row, the weight and the values. How many samples
-    /// were left out, for they are not finite.
+    /// Adds the samples to the sums over `window`, `stride` for each pixel, row by row, of which the first are the weight and
+    /// the values. How many samples were left out, for they are not finite.
     ///
     /// A sample's values stand in a row a channel.
     pub(crate) fn splat(
@@ -35,6 +35,7 @@ impl Group {
         filter: &Filter,
         values: &[[f32; GROUP]],
         window: &Window,
+        stride: usize,
         sums: &mut [f64],
     ) -> u32 {
         kernel.run(Splat {
@@ -42,6 +43,7 @@ impl Group {
             filter,
             values,
             window,
+            stride,
             sums,
         })
     }
@@ -53,6 +55,7 @@ struct Splat<'a> {
     filter: &'a Filter,
     values: &'a [[f32; GROUP]],
     window: &'a Window,
+    stride: usize,
     sums: &'a mut [f64],
 }
 
@@ -84,6 +87,7 @@ impl Task for Splat<'_> {
             filter,
             values,
             window,
+            stride,
             sums,
         } = self;
         let (accepted, refused) = accepted::<F>(group.count, values);
@@ -97,7 +101,6 @@ impl Task for Splat<'_> {
         let reached = center.grown(filter.reach(), window);
         let columns = weights::<F>(filter, &group.offsets[0], reached.x, x, reached.width);
         let rows = weights::<F>(filter, &group.offsets[1], reached.y, y, reached.height);
-        let stride = values.len() + 1;
         let left = (reached.x - window.x) as usize;
         for (py, row) in (reached.y..).zip(&rows[..reached.height as usize]) {
             let start = (py - window.y) as usize * window.width as usize + left;
@@ -220,7 +223,7 @@ mod tests {
             let mut first = None;
             for kernel in Kernel::all() {
                 let mut sums = vec![0.0; expected.len()];
-                let refused = group.splat(kernel, &filter, &values, &window, &mut sums);
+                let refused = group.splat(kernel, &filter, &values, &window, 6, &mut sums);
                 assert_eq!(refused, u32::from(count > 3));
                 for (sum, expected) in sums.iter().zip(&expected) {
                     assert!((sum - expected).abs() < 1e-5, "{sum} {expected}");

@@ -6,7 +6,8 @@
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::{GROUP, Group, Layout};
+use super::splats::Shares;
+use super::{GROUP, Group, Layout, Splats};
 use crate::color::{luminance, rgb_to_xyz};
 use crate::error::{Error, Problem, Result};
 use crate::filter::Filter;
@@ -120,8 +121,11 @@ pub(crate) struct Summed<A> {
 pub(crate) struct Sums {
     window: Window,
     layout: Layout,
-    /// For each pixel, row by row: the weight, then a value a channel.
+    /// For each pixel, row by row: the weight, then a value a channel; then, where there are splats, how many paths were
+    /// begun from it and what splats brought.
     data: Vec<f64>,
+    /// What comes to any place of the film, added with the rest of a part.
+    pub(crate) splats: Splats,
     pub(crate) tally: Tally,
 }
 
@@ -144,6 +148,11 @@ impl Accumulator for Sums {
 
     fn add(&mut self, part: &Self) {
         self.add_rectangle(&part.window, &part.data, 1.0);
+        if let Some(place) = self.layout.splats() {
+            let stride = self.layout.stride();
+            part.splats
+                .add_to(&self.window, &mut self.data, stride, place.start + 1);
+        }
         self.tally.add(&part.tally);
     }
 
@@ -163,9 +172,10 @@ impl Accumulator for Sums {
 impl Sums {
     /// Nothing yet, unless the memory for it is not there.
     pub(crate) fn new(window: Window, layout: Layout) -> Result<Self> {
-        let size = window.width as usize * window.height as usize * (layout.count() + 1);
+        let size = window.width as usize * window.height as usize * layout.stride();
         Ok(Self {
             window,
+            splats: Splats::new(layout.colors().len()),
             layout,
             data: zeros(size, &window)?,
             tally: Tally::default(),
@@ -186,13 +196,31 @@ impl Sums {
         group: &Group,
         values: &[[f32; GROUP]],
     ) {
-        let dropped = group.splat(kernel, filter, values, &self.window, &mut self.data);
+        let stride = self.layout.stride();
+        let dropped = group.splat(kernel, filter, values, &self.window, stride, &mut self.data);
         self.tally.drop(group.pixel, dropped);
+    }
+
+    /// Begins splats, where there are any, that a filter spreads; for each pixel of a window so many paths are begun.
+    pub(crate) fn begin_splats(&mut self, filter: &Filter, window: &Window, count: u32) {
+        let Some(place) = self.layout.splats() else {
+            return;
+        };
+        self.splats.spread_by(filter);
+        let (seen, stride) = (self.window.grown(0, window), self.layout.stride());
+        for y in seen.y..seen.y + seen.height {
+            let row = (y - self.window.y) as usize * self.window.width as usize;
+            let first = row + (seen.x - self.window.x) as usize;
+            let pixels = self.data[first * stride..].chunks_exact_mut(stride);
+            for pixel in pixels.take(seen.width as usize) {
+                pixel[place.start] += f64::from(count);
+            }
+        }
     }
 
     /// Adds the sums of another rectangle, times `scale`, where it overlaps this one.
     pub(crate) fn add_rectangle(&mut self, window: &Window, data: &[f64], scale: f64) {
-        let stride = self.layout.count() + 1;
+        let stride = self.layout.stride();
         let (a, b) = (&self.window, window);
         let (left, right) = (a.x.max(b.x), (a.x + a.width).min(b.x + b.width));
         if left >= right {
@@ -215,7 +243,7 @@ impl Sums {
         window: &Window,
     ) -> (Window, impl Iterator<Item = &[f64]> + Clone) {
         let seen = self.window.grown(0, window);
-        let stride = self.layout.count() + 1;
+        let stride = self.layout.stride();
         let (left, top) = (
             seen.x.saturating_sub(self.window.x) as usize,
             seen.y.saturating_sub(self.window.y) as usize,
@@ -240,7 +268,7 @@ impl Sums {
     pub(crate) fn luminance(&self, [x, y]: [u32; 2]) -> f64 {
         let index = (y - self.window.y) as usize * self.window.width as usize
             + (x - self.window.x) as usize;
-        let pixel = &self.data[index * (self.layout.count() + 1)..];
+        let pixel = &self.data[index * self.layout.stride()..];
         let value = |c: usize| (pixel[c + 1] / pixel[0]) as f32;
         if pixel[0] > 0.0 {
             luminance([value(0), value(1), value(2)]).into()
@@ -258,30 +286,40 @@ impl Sums {
         let main: Vec<&str> = format.channels().collect();
         let names = main.iter().map(|name| String::from(*name));
         let names: Vec<String> = names.chain(extra.iter().cloned()).collect();
-        let stride = self.layout.count() + 1;
+        let stride = self.layout.stride();
         let mut data = vec![0.0; self.data.len() / stride * names.len()];
+        let shares = self
+            .layout
+            .splats()
+            .map(|place| Shares::new(film, &self.window, &self.data, stride, place));
         let pixels = data.par_chunks_exact_mut(names.len());
-        let pixels = pixels.zip(self.data.par_chunks_exact(stride));
-        pixels.with_min_len(GRAIN).for_each(|(out, pixel)| {
-            let scale = if pixel[0] > 0.0 { 1.0 / pixel[0] } else { 0.0 };
-            let value = |c: usize| (pixel[c + 1] * scale) as f32;
-            let rgb = [value(0), value(1), value(2)];
-            let (main, rest) = out.split_at_mut(main.len());
-            let color = match format.colors {
-                Coordinates::Rgb | Coordinates::None => rgb,
-                Coordinates::Luminance => [luminance(rgb); 3],
-                Coordinates::Xyz => rgb_to_xyz(rgb),
-            };
-            for (out, value) in main.iter_mut().zip(color) {
-                *out = value;
-            }
-            if let (true, Some(alpha)) = (format.alpha, main.last_mut()) {
-                *alpha = value(opacity);
-            }
-            for (out, c) in rest.iter_mut().zip(others.clone()) {
-                *out = value(c);
-            }
-        });
+        let pixels = pixels.zip(self.data.par_chunks_exact(stride)).enumerate();
+        pixels
+            .with_min_len(GRAIN)
+            .for_each(|(index, (out, pixel))| {
+                let scale = if pixel[0] > 0.0 { 1.0 / pixel[0] } else { 0.0 };
+                let splat = |c: usize| match &shares {
+                    Some(shares) => shares.value(index, pixel, c),
+                    None => 0.0,
+                };
+                let value = |c: usize| (pixel[c + 1] * scale + splat(c)) as f32;
+                let rgb = [value(0), value(1), value(2)];
+                let (main, rest) = out.split_at_mut(main.len());
+                let color = match format.colors {
+                    Coordinates::Rgb | Coordinates::None => rgb,
+                    Coordinates::Luminance => [luminance(rgb); 3],
+                    Coordinates::Xyz => rgb_to_xyz(rgb),
+                };
+                for (out, value) in main.iter_mut().zip(color) {
+                    *out = value;
+                }
+                if let (true, Some(alpha)) = (format.alpha, main.last_mut()) {
+                    *alpha = value(opacity);
+                }
+                for (out, c) in rest.iter_mut().zip(others.clone()) {
+                    *out = value(c);
+                }
+            });
         Image::from_data(self.window.width, self.window.height, names, data)
     }
 }

@@ -112,6 +112,12 @@ impl<C: ColorModel> Aov<C> {
                 .find(is_child)
                 .map_or("", |p| &p.name);
             let integrator = Box::new(Integrator::<C>::build(&child, context)?);
+            if integrator.traces_light() && !(name.is_empty() && nested.is_empty()) {
+                let message = format!("{} does not give its image beside others", child.plugin());
+                return Err(child
+                    .error("", message)
+                    .help("leave it the first, without a name"));
+            }
             nested.push(Nested {
                 name: name.to_owned(),
                 integrator,
@@ -155,6 +161,15 @@ impl<C: ColorModel> Estimator<C> for Aov<C> {
         (self.nested.iter()).any(|nested| nested.integrator.renders_media())
     }
 
+    fn leaves_out(&self, scene: &Scene<C>) -> Option<String> {
+        let mut nested = self.nested.iter();
+        nested.find_map(|nested| nested.integrator.leaves_out(scene))
+    }
+
+    fn traces_light(&self) -> bool {
+        (self.nested.iter()).any(|nested| nested.integrator.traces_light())
+    }
+
     fn estimate(
         &self,
         scene: &Scene<C>,
@@ -165,10 +180,7 @@ impl<C: ColorModel> Estimator<C> for Aov<C> {
     ) {
         let mut children = Vec::with_capacity(self.nested.len());
         for Nested { integrator, .. } in &self.nested {
-            let mut child = Estimates {
-                values: Vec::new(),
-                extra: Vec::new(),
-            };
+            let mut child = Estimates::default();
             integrator.estimate(scene, sampler, starts, &mut child, cost);
             children.push((child, integrator.extra_channels().len()));
         }
@@ -178,6 +190,10 @@ impl<C: ColorModel> Estimator<C> for Aov<C> {
 
         estimates.values.clear();
         estimates.extra.clear();
+        estimates.splats.clear();
+        if let Some((first, _)) = children.first_mut() {
+            estimates.splats.append(&mut first.splats);
+        }
         let mut developed = vec![0.0; scene.color().channels().len()];
         for (i, (start, hit)) in starts.iter().zip(&hits).enumerate() {
             let nothing = Estimate {

@@ -60,13 +60,16 @@ impl<C: ColorModel> Arrival<'_, '_, C> {
         }
     }
 
-    /// What comes of it, weighted against light sampling.
-    pub(super) fn emission(&self) -> Option<C::Sample> {
+    /// What comes of it, by a weight that depends on the density with which light sampling finds it.
+    pub(super) fn emission(&self, weight: impl FnOnce(f32) -> f32) -> Option<C::Sample> {
         let (radiance, light_pdf) = self.emitted()?;
-        let weight = self
-            .scattered
-            .map_or(1.0, |s| power(s.pdf, light_pdf * s.light_share));
-        Some(self.throughput * radiance * weight)
+        Some(self.throughput * radiance * weight(light_pdf))
+    }
+
+    /// The weight against light sampling.
+    pub(super) fn weight(&self, light_pdf: f32) -> f32 {
+        self.scattered
+            .map_or(1.0, |s| power(s.pdf, light_pdf * s.light_share))
     }
 
     /// What is returned of ambient light.
@@ -82,7 +85,16 @@ impl<C: ColorModel> Arrival<'_, '_, C> {
 
     /// Adds emission, ambient light and opacity.
     pub(super) fn add_to(&self, estimate: &mut Estimate<C::Sample>) {
-        if let Some(emission) = self.emission() {
+        self.add_weighted(estimate, |light_pdf| self.weight(light_pdf));
+    }
+
+    /// The same, with emission by another weight.
+    pub(super) fn add_weighted(
+        &self,
+        estimate: &mut Estimate<C::Sample>,
+        weight: impl FnOnce(f32) -> f32,
+    ) {
+        if let Some(emission) = self.emission(weight) {
             estimate.radiance += emission;
         }
         if let Some(ambient) = self.ambient() {

@@ -1,4 +1,4 @@
-//! Multiple importance sampling: two ways to find light, each weighted by how likely it was to find it
+//! Multiple importance sampling: several ways to find light, each weighted by how likely it was to find it
 //! (Veach and Guibas, *Optimally combining sampling techniques*, 1995).
 
 use crate::lanes::Lanes;
@@ -9,4 +9,12 @@ use crate::lanes::Lanes;
 pub(super) fn power<F: Lanes>(a: F, b: F) -> F {
     let ratio = b / a;
     F::one() / (F::one() + ratio * ratio)
+}
+
+/// The same of three techniques; the densities of the other two are given as multiples of that which drew.
+#[inline(always)]
+pub(super) fn power_of_three<F: Lanes>(a: F, b: F) -> F {
+    let weight = F::one() / (F::one() + a * a + b * b);
+    // Ratios that are not finite are those of techniques that hardly ever draw.
+    F::select(weight.is_finite(), weight, F::zero())
 }

@@ -7,11 +7,13 @@
 mod cost;
 
 mod aov;
+mod bdpt;
 mod depth;
 mod direct;
 mod moment;
 mod path;
 mod phong;
+mod ptracer;
 mod raster;
 mod volpath;
 mod volpathmis;
@@ -20,11 +22,15 @@ mod arrival;
 mod bounce;
 mod footprint;
 mod layers;
+mod lens;
+mod light_paths;
 mod limits;
 mod mis;
 mod runs;
 mod volumetric;
 mod wave;
+
+use glam::Vec2;
 
 use crate::color::ColorModel;
 use crate::description::NodeId;
@@ -35,6 +41,7 @@ use crate::scene::Scene;
 
 pub use cost::{Cost, Stats};
 pub use footprint::Footprint;
+pub use lens::Lens;
 pub use limits::timeout_note;
 pub(crate) use raster::Raster;
 
@@ -58,6 +65,17 @@ pub struct Estimate<S> {
     pub alpha: f32,
 }
 
+/// Light that came to the film along a path from a light.
+#[derive(Clone, Copy, Debug)]
+pub struct Splat<S> {
+    /// On the film, as in [`crate::sensor::Camera::ray`].
+    pub film: Vec2,
+    /// What it adds to the mean over the film of a sample a pixel.
+    pub value: S,
+    /// The start that it shares its wavelengths with.
+    pub start: u32,
+}
+
 /// What the starts of a batch came to.
 #[derive(Clone, Debug)]
 pub struct Estimates<S> {
@@ -65,6 +83,8 @@ pub struct Estimates<S> {
     pub values: Vec<Estimate<S>>,
     /// For each start the values of [`Estimator::extra_channels`].
     pub extra: Vec<f32>,
+    /// Of integrators that [trace light](Estimator::traces_light).
+    pub splats: Vec<Splat<S>>,
 }
 
 impl<S> Default for Estimates<S> {
@@ -72,6 +92,7 @@ impl<S> Default for Estimates<S> {
         Self {
             values: Vec::new(),
             extra: Vec::new(),
+            splats: Vec::new(),
         }
     }
 }
@@ -85,6 +106,16 @@ pub trait Estimator<C: ColorModel>: std::fmt::Debug + Send + Sync {
 
     /// Whether light is scattered by participating media.
     fn renders_media(&self) -> bool {
+        false
+    }
+
+    /// What it leaves out of the scene, in words, if anything.
+    fn leaves_out(&self, _scene: &Scene<C>) -> Option<String> {
+        None
+    }
+
+    /// Whether paths also set out from lights, one a start, so that light comes to any place of the film.
+    fn traces_light(&self) -> bool {
         false
     }
 
@@ -109,6 +140,8 @@ pub struct Context {
     pub footprint: Option<Footprint>,
     /// The node of the medium that the camera stands in.
     pub medium: Option<NodeId>,
+    /// The sensor, where light finds it.
+    pub lens: Option<Lens>,
 }
 
 family! {
@@ -116,11 +149,13 @@ family! {
     #[derive(Debug)]
     pub enum Integrator<C>: Estimator, context Context {
         "aov" => Aov(aov::Aov<C>),
+        "bdpt" => Bdpt(bdpt::Bdpt),
         "depth" => Depth(depth::Depth),
         "direct" => Direct(direct::Direct),
         "moment" => Moment(moment::Moment<C>),
         "path" => Path(path::Path),
         "phong" => Phong(phong::Phong),
+        "ptracer" => PTracer(ptracer::PTracer),
         "raster" => Raster(raster::Raster),
         "volpath" => VolPath(volpath::VolPath),
         "volpathmis" => VolPathMis(volpathmis::VolPathMis),
@@ -144,6 +179,14 @@ impl<C: ColorModel> Estimator<C> for Integrator<C> {
 
     fn renders_media(&self) -> bool {
         (**self).renders_media()
+    }
+
+    fn leaves_out(&self, scene: &Scene<C>) -> Option<String> {
+        (**self).leaves_out(scene)
+    }
+
+    fn traces_light(&self) -> bool {
+        (**self).traces_light()
     }
 
     fn estimate(

@@ -50,6 +50,14 @@ impl<C: ColorModel> Estimator<C> for Moment<C> {
         self.nested.renders_media()
     }
 
+    fn leaves_out(&self, scene: &Scene<C>) -> Option<String> {
+        self.nested.leaves_out(scene)
+    }
+
+    fn traces_light(&self) -> bool {
+        self.nested.traces_light()
+    }
+
     fn estimate(
         &self,
         scene: &Scene<C>,

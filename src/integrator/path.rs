@@ -227,10 +227,7 @@ mod tests {
             }
         });
         let starts: Vec<Start<C>> = starts.collect();
-        let mut estimates = Estimates {
-            values: Vec::new(),
-            extra: Vec::new(),
-        };
+        let mut estimates = Estimates::default();
         let sampler = Sampler::default();
         integrator.estimate(
             scene,

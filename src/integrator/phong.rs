@@ -82,7 +82,10 @@ impl<S: Spectral> Batch<'_, S> {
     /// Adds what a ray's end brings: emission, ambient light, opacity.
     fn arrive<C: ColorModel<Sample = S>>(&mut self, slot: usize, arrival: &Arrival<'_, '_, C>) {
         let layers = self.layers;
-        if let (Some(light), Some(emission)) = (arrival.light(), arrival.emission()) {
+        if let (Some(light), Some(emission)) = (
+            arrival.light(),
+            arrival.emission(|light_pdf| arrival.weight(light_pdf)),
+        ) {
             self.add(slot, layers.place(Term::Emission, light.index()), emission);
         }
         if let Some(ambient) = arrival.ambient() {

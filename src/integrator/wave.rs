@@ -8,14 +8,14 @@ use super::runs::Runs;
 use super::{Cost, Estimate, Start};
 use crate::accel::Met;
 use crate::color::{ColorModel, Spectra as _, Spectral};
-use crate::interaction::{Hit, Points, Ray};
+use crate::interaction::{Hit, Points, Ray, ShadowRays};
 use crate::lanes::{Lanes, MAX_LANES, Mask as _, Task, Vec3};
 use crate::light::LightSamples;
 use crate::material::Material;
 use crate::sampler::{Sampler, Stream, Streams};
 use crate::scene::Scene;
 
-/// A path on its way, beside its ray; `M` is what it carries through media.
+/// A path on its way, beside its ray; `M` is what it carries beside its light: through media, or of other ways to make it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Walker<C: ColorModel, M = ()> {
     pub(super) throughput: C::Sample,
@@ -178,6 +178,18 @@ impl<C: ColorModel, T, M: Copy> Outcome<'_, C, T, M> {
         let rays = block
             .at
             .shadow(light.direction, light.target, light.distant);
+        self.ask_along(block, &rays, lit, shadow);
+    }
+
+    /// The same of any shadow rays.
+    #[inline(always)]
+    pub(super) fn ask_along<F: Lanes>(
+        &mut self,
+        block: &Block<'_, C, F, M>,
+        rays: &ShadowRays<F>,
+        lit: F::Mask,
+        shadow: impl Fn(usize) -> T,
+    ) {
         let (origins, directions) = (rays.origin.rows(), rays.direction.rows());
         let ends = rays.t_max.row();
         for lane in lit.lanes() {
@@ -248,12 +260,12 @@ impl<S: Spectral> Contribution<S> {
     }
 }
 
-impl<C: ColorModel> Outcome<'_, C, Contribution<C::Sample>> {
+impl<C: ColorModel, M: Copy> Outcome<'_, C, Contribution<C::Sample>, M> {
     /// Asks whether light that was drawn can be seen, where it would bring anything.
     #[inline(always)]
     pub(super) fn light<F: Lanes>(
         &mut self,
-        block: &Block<'_, C, F>,
+        block: &Block<'_, C, F, M>,
         light: &LightSamples<F, C::Columns<F>>,
         value: C::Columns<F>,
     ) {
@@ -289,17 +301,17 @@ pub(super) struct Wave<'a, C: ColorModel, T, M = ()> {
 impl<'a, C: ColorModel, T> Wave<'a, C, T> {
     /// At the camera.
     pub(super) fn new(scene: &'a Scene<C>, sampler: &'a Sampler, starts: &[Start<C>]) -> Self {
-        Self::carrying(scene, sampler, starts, |_| ())
+        Self::carrying(scene, sampler, starts, |_, _| ())
     }
 }
 
 impl<'a, C: ColorModel, T, M: Copy> Wave<'a, C, T, M> {
-    /// At the camera, with what paths carry through media.
+    /// At their starts, with what each carries beside its light, by slot.
     pub(super) fn carrying(
         scene: &'a Scene<C>,
         sampler: &'a Sampler,
         starts: &[Start<C>],
-        media: impl Fn(&Start<C>) -> M,
+        media: impl Fn(usize, &Start<C>) -> M,
     ) -> Self {
         let mut walkers = WithRays::with_capacity(starts.len());
         for (slot, start) in (0..).zip(starts) {
@@ -310,7 +322,7 @@ impl<'a, C: ColorModel, T, M: Copy> Wave<'a, C, T, M> {
                 slot,
                 eta: 1.0,
                 scattered: None,
-                media: media(start),
+                media: media(slot as usize, start),
             };
             walkers.push(start.ray, walker);
         }

@@ -10,7 +10,11 @@ use glam::{Vec2, Vec3};
 
 use super::block::BlockEmitter;
 use super::brightness::Brightness;
-use super::{Emitter, LightContext, LightSample, LightSamples, interaction, mean_of};
+use super::emission::place_on;
+use super::{
+    Ball, Draw, Emission, Emitter, LightContext, LightSample, LightSamples, Seen, Source,
+    interaction, mean_of,
+};
 use crate::color::{ColorModel, Role, Spectral};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, texture};
@@ -32,6 +36,8 @@ pub struct Area<C: ColorModel> {
     mean: f64,
     /// Where a texture is not even.
     brightness: Option<Brightness>,
+    /// The density of paths that set out: even over the area and by the cosine. 0 where its points cannot be drawn so.
+    density: f32,
 }
 
 impl<C: ColorModel> Area<C> {
@@ -67,6 +73,10 @@ impl<C: ColorModel> Area<C> {
             motion: context.motion.cloned(),
             mean,
             brightness,
+            density: match context.motion.is_none() && shape.evenly(Vec2::splat(0.5)).is_some() {
+                true => (1.0 / (PI * shape.area())) as f32,
+                false => 0.0,
+            },
         })
     }
 }
@@ -186,6 +196,35 @@ impl<C: ColorModel> Emitter<C> for Area<C> {
             .transformed(&to_own, to_own.vector(-at.frame.to_world(at.wi)));
         let from = to_own.point(from);
         self.density(from, &own) * solid_angle_ratio(&to_world, own.position - from)
+    }
+
+    fn emit(
+        &self,
+        _ball: &Ball,
+        draw: &Draw,
+        wavelengths: &C::Wavelengths,
+    ) -> Option<Emission<'_, C::Sample>> {
+        if self.density <= 0.0 {
+            return None;
+        }
+        let place = place_on(&self.shape, draw.place)?;
+        let direction = place.direction(draw.direction);
+        let (at, origin) = place.toward(direction);
+        Some(Emission {
+            origin,
+            direction,
+            flux: self.surface_radiance(&at, wavelengths) * self.density.recip(),
+            density: self.density,
+            source: Source::Surface(Box::new(at)),
+        })
+    }
+
+    fn sends_paths(&self) -> bool {
+        self.density > 0.0
+    }
+
+    fn emission_density(&self, _ball: &Ball, _seen: &Seen) -> f32 {
+        self.density
     }
 
     fn power(&self, _color: &C, _radius: f64) -> f64 {

@@ -1,23 +1,28 @@
 //! `directionalarea`: a shape whose every point emits along its normal alone. No direction that is drawn from elsewhere
-//! is that one, so that integrators which start at the camera find none of its light, here as in Mitsuba; the shape is
-//! black, as one that gives light is.
+//! is that one, so that integrators which start at the camera find none of its light, here as in Mitsuba; `ptracer` and `bdpt`
+//! follow it from the light. The shape is black, as one that gives light is.
 
-use std::marker::PhantomData;
+use std::sync::Arc;
 
 use glam::Vec2;
 
-use super::{Emitter, LightContext, LightSample};
+use super::emission::place_on;
+use super::{
+    Ball, Draw, Emission, Emitter, LightContext, LightSample, Seen, Source, mean_over_square,
+};
 use crate::color::{ColorModel, Role};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, texture};
 use crate::error::Result;
 use crate::interaction::Reference;
-use crate::texture::Palettes;
+use crate::shape::Geometry;
+use crate::texture::{Palettes, Texture};
 
 /// A shape that emits along its normals.
 #[derive(Clone, Debug)]
 pub struct DirectionalArea<C: ColorModel> {
-    colors: PhantomData<C>,
+    radiance: Texture<C>,
+    shape: Arc<Geometry>,
 }
 
 impl<C: ColorModel> DirectionalArea<C> {
@@ -37,22 +42,21 @@ impl<C: ColorModel> DirectionalArea<C> {
         properties: &Properties<'_>,
         context: &LightContext<'_, C>,
     ) -> Result<Self> {
-        if context.shape.is_none() {
+        let Some(shape) = context.shape else {
             let message = "a directionalarea emitter gives light from a shape, and stands in none";
             return Err(properties.error("", message).help("nest it in a <shape>"));
-        }
+        };
         let Palettes { colors, .. } = context.palettes;
-        // Nobody asks for it, but it has to be right.
-        colors.texture(properties, "radiance", Role::Emission)?;
         let warning = properties.error(
             "",
             "paths from the camera find no light of a directionalarea",
         );
-        colors.warn(
-            warning.help("an area emitter shines in all directions, a projector throws a picture"),
-        );
+        colors.warn(warning.help(
+            "ptracer and bdpt follow it from the light; an area emitter shines in all directions",
+        ));
         Ok(Self {
-            colors: PhantomData,
+            radiance: colors.texture(properties, "radiance", Role::Emission)?,
+            shape: shape.clone(),
         })
     }
 }
@@ -65,5 +69,32 @@ impl<C: ColorModel> Emitter<C> for DirectionalArea<C> {
         _wavelengths: &C::Wavelengths,
     ) -> Option<LightSample<C::Sample>> {
         None
+    }
+
+    fn emit(
+        &self,
+        _ball: &Ball,
+        draw: &Draw,
+        wavelengths: &C::Wavelengths,
+    ) -> Option<Emission<'_, C::Sample>> {
+        let place = place_on(&self.shape, draw.place)?;
+        let direction = place.front;
+        let (at, origin) = place.toward(direction);
+        let density = self.shape.area().recip() as f32;
+        Some(Emission {
+            origin,
+            direction,
+            flux: self.radiance.eval(&at, wavelengths) * density.recip(),
+            density,
+            source: Source::Beam(Box::new(at)),
+        })
+    }
+
+    fn emission_density(&self, _ball: &Ball, _seen: &Seen) -> f32 {
+        0.0
+    }
+
+    fn emitted_power(&self, color: &C, _radius: f64) -> f64 {
+        self.shape.area() * mean_over_square(color, &self.radiance)
     }
 }

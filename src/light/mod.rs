@@ -7,6 +7,7 @@ mod brightness;
 mod constant;
 mod directional;
 mod directionalarea;
+mod emission;
 mod envmap;
 mod grid;
 mod point;
@@ -33,6 +34,7 @@ use crate::shape::{Geometry, SurfaceSample};
 use crate::texture::{Palettes, Texture};
 
 pub use block::LightSamples;
+pub use emission::{Ball, Draw, Emission, Seen, Source};
 
 /// A direction drawn toward a light.
 #[derive(Clone, Copy, Debug)]
@@ -72,6 +74,29 @@ pub trait Emitter<C: ColorModel>: std::fmt::Debug + Send + Sync {
     /// one that cannot be drawn. Which light is drawn goes by it, so that it need not be exact.
     fn power(&self, _color: &C, _radius: f64) -> f64 {
         0.0
+    }
+
+    /// The beginning of a path that goes from the light; `None` where none does, or of a light of which none is drawn.
+    fn emit(
+        &self,
+        ball: &Ball,
+        draw: &Draw,
+        wavelengths: &C::Wavelengths,
+    ) -> Option<Emission<'_, C::Sample>> {
+        emission::from_afar(self, ball, draw, wavelengths)
+    }
+    /// The density of such paths where the light is seen: per unit area at right angles and solid angle (where it is a point
+    /// or a single direction, without what no path could meet by chance).
+    fn emission_density(&self, ball: &Ball, seen: &Seen) -> f32 {
+        emission::density_from_afar(ball, seen)
+    }
+    /// Whether its paths can be drawn.
+    fn sends_paths(&self) -> bool {
+        true
+    }
+    /// As [`Emitter::power`]; by it lights are chosen that paths set out from.
+    fn emitted_power(&self, color: &C, radius: f64) -> f64 {
+        self.power(color, radius)
     }
 
     /// Whether it comes from nowhere, so that there is no direction to draw.

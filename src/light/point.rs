@@ -4,12 +4,14 @@ use std::f64::consts::PI;
 
 use glam::{DVec3, Vec2};
 
-use super::{Emitter, LightContext, LightSample, Origin, mean_of};
+use super::emission::from_point;
+use super::{Ball, Draw, Emission, Emitter, LightContext, LightSample, Origin, Seen, mean_of};
 use crate::color::{ColorModel, Role};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, color, vector};
 use crate::error::Result;
 use crate::interaction::Reference;
+use crate::lanes::warp;
 
 /// A point that gives light.
 #[derive(Clone, Debug)]
@@ -17,6 +19,9 @@ pub struct Point<C: ColorModel> {
     intensity: C::Stored,
     position: Origin,
 }
+
+/// Of a direction.
+const PDF: f32 = 0.25 * std::f32::consts::FRAC_1_PI;
 
 impl<C: ColorModel> Point<C> {
     pub(super) const PLUGIN: Plugin = Plugin {
@@ -72,6 +77,21 @@ impl<C: ColorModel> Emitter<C> for Point<C> {
             pdf: 1.0,
             delta: true,
         })
+    }
+
+    fn emit(
+        &self,
+        _ball: &Ball,
+        draw: &Draw,
+        wavelengths: &C::Wavelengths,
+    ) -> Option<Emission<'_, C::Sample>> {
+        let position = self.position.at(draw.time);
+        let direction = warp::uniform_sphere::<f32>(draw.direction.into()).into();
+        from_point(self, position, direction, PDF, draw.time, wavelengths)
+    }
+
+    fn emission_density(&self, _ball: &Ball, seen: &Seen) -> f32 {
+        PDF / (seen.distance * seen.distance)
     }
 
     fn power(&self, color: &C, _radius: f64) -> f64 {

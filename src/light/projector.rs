@@ -6,7 +6,11 @@ use std::f64::consts::PI;
 
 use glam::{Vec2, Vec3};
 
-use super::{Emitter, LightContext, LightSample, mean_over_square, texture_point, to_world};
+use super::emission::from_point;
+use super::{
+    Ball, Draw, Emission, Emitter, LightContext, LightSample, Seen, mean_over_square,
+    texture_point, to_world,
+};
 use crate::color::{ColorModel, Role};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, float, texture};
@@ -58,6 +62,14 @@ impl<C: ColorModel> Projector<C> {
     }
 }
 
+impl<C: ColorModel> Projector<C> {
+    /// The density of directions toward points drawn evenly over the image, at that cosine from the axis.
+    fn pdf(&self, cosine: f32) -> f32 {
+        let area = 4.0 * self.half.x * self.half.y;
+        1.0 / (area * cosine * cosine * cosine)
+    }
+}
+
 impl<C: ColorModel> Emitter<C> for Projector<C> {
     fn sample(
         &self,
@@ -86,6 +98,26 @@ impl<C: ColorModel> Emitter<C> for Projector<C> {
             pdf: 1.0,
             delta: true,
         })
+    }
+
+    fn emit(
+        &self,
+        _ball: &Ball,
+        draw: &Draw,
+        wavelengths: &C::Wavelengths,
+    ) -> Option<Emission<'_, C::Sample>> {
+        let to_world = self.to_world.at(draw.time);
+        let local = ((1.0 - 2.0 * draw.direction) * self.half).extend(1.0);
+        let direction = to_world.vector(local).normalize();
+        let pdf = self.pdf(local.length().recip());
+        let position = to_world.translation();
+        from_point(self, position, direction, pdf, draw.time, wavelengths)
+    }
+
+    fn emission_density(&self, _ball: &Ball, seen: &Seen) -> f32 {
+        let axis = self.to_world.at(seen.time).vector(Vec3::Z).normalize();
+        let cosine = -axis.dot(seen.direction);
+        self.pdf(cosine) / (seen.distance * seen.distance)
     }
 
     fn power(&self, color: &C, _radius: f64) -> f64 {

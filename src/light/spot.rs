@@ -6,14 +6,17 @@ use std::f64::consts::PI;
 
 use glam::{Vec2, Vec3};
 
+use super::emission::from_point;
 use super::{
-    Emitter, LightContext, LightSample, mean_of, mean_over_square, texture_point, to_world,
+    Ball, Draw, Emission, Emitter, LightContext, LightSample, Seen, mean_of, mean_over_square,
+    texture_point, to_world,
 };
 use crate::color::{ColorModel, Role};
 use crate::description::declared::{Plugin, color, float, map};
 use crate::description::{Kind, Properties};
 use crate::error::Result;
 use crate::interaction::Reference;
+use crate::lanes;
 use crate::math::Moving;
 use crate::texture::Texture;
 
@@ -90,6 +93,17 @@ impl<C: ColorModel> Spot<C> {
         })
     }
 
+    /// The cosine of the cutoff, from 1.
+    fn cap(&self) -> f32 {
+        let half = (0.5 * self.cutoff).sin();
+        2.0 * half * half
+    }
+
+    /// The density of directions that are drawn evenly within the cutoff.
+    fn pdf(&self) -> f32 {
+        1.0 / (std::f32::consts::TAU * self.cap())
+    }
+
     /// How much of the intensity leaves at that angle from the axis.
     fn falloff(&self, angle: f32) -> f32 {
         if angle <= self.beam {
@@ -129,6 +143,33 @@ impl<C: ColorModel> Emitter<C> for Spot<C> {
             pdf: 1.0,
             delta: true,
         })
+    }
+
+    fn emit(
+        &self,
+        _ball: &Ball,
+        draw: &Draw,
+        wavelengths: &C::Wavelengths,
+    ) -> Option<Emission<'_, C::Sample>> {
+        let to_world = self.to_world.at(draw.time);
+        let (sin, cos) = lanes::sin_cos_turns(draw.direction.x);
+        let drop = draw.direction.y * self.cap();
+        let aside = (drop * (2.0 - drop)).sqrt();
+        let local = Vec3::new(aside * cos, aside * sin, 1.0 - drop);
+        let direction = to_world.vector(local).normalize();
+        let position = to_world.translation();
+        from_point(
+            self,
+            position,
+            direction,
+            self.pdf(),
+            draw.time,
+            wavelengths,
+        )
+    }
+
+    fn emission_density(&self, _ball: &Ball, seen: &Seen) -> f32 {
+        self.pdf() / (seen.distance * seen.distance)
     }
 
     fn power(&self, color: &C, _radius: f64) -> f64 {

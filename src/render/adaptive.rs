@@ -466,7 +466,8 @@ impl Sink for HalfBlock<'_> {
 
     fn take(&mut self, kernel: Kernel, group: &Group, values: &[[f32; GROUP]]) {
         let sums = self.record.sums_mut();
-        let dropped = group.splat(kernel, self.filter, values, &self.reach, sums);
+        let stride = values.len() + 1;
+        let dropped = group.splat(kernel, self.filter, values, &self.reach, stride, sums);
         self.tally.drop(group.pixel, dropped);
     }
 }

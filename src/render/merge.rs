@@ -236,7 +236,7 @@ fn add_uniform(sums: &mut Sums, mut reader: Reader) -> Result<Tail> {
     /// Numbers read at a time, but for longer rows.
     const CHUNK: usize = 1 << 15;
     let shown = *sums.window();
-    let stride = reader.head.layout.count() + 1;
+    let stride = reader.head.layout.stride();
     let mut numbers = Vec::new();
     while let Some(at) = reader.place()? {
         let [x, y, width, height] = at.place;

@@ -25,9 +25,17 @@ pub(super) struct Plan {
 
 impl Plan {
     pub(super) fn new(film: &Film, spp: u32) -> Self {
-        let full = film.sampled();
-        let needed = film.shown().grown(film.filter.reach(), &full);
-        let tiles = tiles(&full, &needed);
+        let needed = film.shown().grown(film.filter.reach(), &film.sampled());
+        Self::of(film, needed, spp)
+    }
+
+    /// The same where samples of any pixel bring light to the crop.
+    pub(super) fn whole(film: &Film, spp: u32) -> Self {
+        Self::of(film, film.sampled(), spp)
+    }
+
+    fn of(film: &Film, needed: Window, spp: u32) -> Self {
+        let tiles = tiles(&film.sampled(), &needed);
         Self { needed, tiles, spp }
     }
 

@@ -14,7 +14,7 @@ use super::machine::machine;
 use super::memory::{self, Estimate};
 use super::options::Options;
 use super::origin::{Origin, Outcome};
-use super::plan::Completed;
+use super::plan::{Completed, Plan};
 use super::plugins;
 use super::progress::{Phase, Picture, Progress};
 use super::rastered;
@@ -25,7 +25,7 @@ use crate::description::{Description, Kind, NodeId};
 use crate::error::{self, Error, Location, Problem, Problems, Result};
 use crate::film::Layout;
 use crate::image::{self, Image, Window};
-use crate::integrator::{self, Estimator, Footprint, Integrator};
+use crate::integrator::{self, Estimator, Footprint, Integrator, Lens};
 use crate::mesh::ReadMesh;
 use crate::sampler::Sampler;
 use crate::scene::{self, Assets, Scene};
@@ -177,6 +177,10 @@ pub(super) fn view<C: ColorModel>(description: &Description, sensor: NodeId) -> 
                 medium: properties
                     .child(Kind::Medium)?
                     .map(|medium| medium.node_id()),
+                lens: sensor
+                    .as_ref()
+                    .zip(film.as_ref())
+                    .and_then(|(sensor, film)| Lens::new(sensor, film)),
                 footprint: sensor
                     .as_ref()
                     .filter(|sensor| sensor.is_projective())
@@ -449,6 +453,11 @@ pub(super) fn prepare<'k, C: ColorModel>(ask: &'k mut Ask<'_>, color: C) -> Resu
     let view = sensor.and_then(|sensor| problems.take(view::<C>(description, sensor)));
     let view = view.filter(|view| {
         let layout = layout(&color, &view.integrator);
+        problems.take(light_anywhere(
+            options,
+            &view.integrator,
+            &view.integrator_name,
+        ));
         let fit = image::check_channels(&written(&view.film, &layout))
             .map_err(|error| integrator_at(description, error));
         problems.take(fit).is_some()
@@ -456,7 +465,7 @@ pub(super) fn prepare<'k, C: ColorModel>(ask: &'k mut Ask<'_>, color: C) -> Resu
     let share = view.as_ref().map(|view| Share {
         film: memory::film(
             &view.film,
-            layout(&color, &view.integrator).count(),
+            layout(&color, &view.integrator).stride(),
             options.adaptive.is_some(),
         ),
         rays: rays(&view.film, view.sampler.sample_count()),
@@ -517,6 +526,10 @@ pub(super) fn prepare<'k, C: ColorModel>(ask: &'k mut Ask<'_>, color: C) -> Resu
     warnings.extend(findings.notes);
     warnings.extend(facts.warnings.iter().cloned());
     warnings.extend(view.warnings.iter().cloned());
+    if let Some(message) = view.integrator.leaves_out(scene) {
+        let warning = Error::unsupported(message).help("--integrator bdpt or path sees them");
+        warnings.extend_from_slice(integrator_at(description, warning).problems());
+    }
     warnings.extend(black::no_light(description, scene.light_count()));
     Ok(Job {
         scene,
@@ -546,15 +559,42 @@ fn written(film: &Film, layout: &Layout) -> Vec<String> {
     }
 }
 
+/// Light that comes to the whole film does not become more where its noise is.
+fn light_anywhere<C: ColorModel>(
+    options: &Options,
+    integrator: &Integrator<C>,
+    name: &str,
+) -> Result<()> {
+    if !integrator.traces_light() {
+        return Ok(());
+    }
+    let option = match options {
+        _ if options.adaptive.is_some() => "--noise-threshold",
+        _ => return Ok(()),
+    };
+    let message =
+        format!("light of {name} comes to the whole film, and {option} is about some of it");
+    Err(Error::input(message).help("--integrator path takes it"))
+}
+
 /// The channels of samples.
 pub(super) fn layout<C: ColorModel>(color: &C, integrator: &Integrator<C>) -> Layout {
     Layout::new(color.channels(), integrator.extra_channels())
+        .with_splats(integrator.traces_light())
 }
 
 impl<C: ColorModel> Job<'_, C> {
     /// The channels of samples.
     pub(super) fn layout(&self) -> Layout {
         layout(self.scene.color(), &self.view.integrator)
+    }
+
+    /// The units of so many samples a pixel.
+    pub(super) fn plan(&self, spp: u32) -> Plan {
+        match self.view.integrator.traces_light() {
+            true => Plan::whole(&self.view.film, spp),
+            false => Plan::new(&self.view.film, spp),
+        }
     }
 
     /// What the image depends on; the scene's files are read for it once.

@@ -11,6 +11,7 @@ use crate::film::{GROUP, Group, Layout, Tally};
 use crate::integrator::{Cost, Estimate, Estimates, Estimator as _, Start};
 use crate::lanes::{Kernel, Lanes, Task, Vec2};
 use crate::sampler::{Sampler, Stream, Streams};
+use crate::sensor::Film;
 
 /// Bytes of path state in flight in a batch: within a core's caches, with rays enough for the tracer.
 const BATCH_BYTES: usize = 512 << 10;
@@ -115,6 +116,13 @@ impl<C: ColorModel> Batch<'_, C> {
             first += group.count;
             sink.take(scene.tracer().kernel(), group, &self.columns);
         }
+        let place = Place::of(&self.job.view.film);
+        for splat in &self.estimates.splats {
+            let wavelengths = &starts[splat.start as usize].wavelengths;
+            color.develop(&splat.value, wavelengths, &mut self.row);
+            self.row.iter_mut().for_each(|value| *value *= place.share);
+            sink.splat(place.on(splat.film), &self.row);
+        }
         self.film += estimated.elapsed();
         let rays = self.cost.stats.rays() - before;
         self.progress.advance(starts.len() as u64, rays);
@@ -135,8 +143,36 @@ fn weight<C: ColorModel>(view: &View<C>, group: &Group, sample: usize) -> f32 {
     view.sensor.weight(place)
 }
 
+/// Where places of the sensor's lie among pixels.
+struct Place {
+    size: glam::Vec2,
+    margin: f32,
+    /// The film's part of all that paths are begun from.
+    share: f32,
+}
+
+impl Place {
+    fn of(film: &Film) -> Self {
+        let all = film.sampled();
+        let area = |width: u32, height: u32| f64::from(width) * f64::from(height);
+        Self {
+            size: glam::Vec2::new(film.width as f32, film.height as f32),
+            margin: film.margin() as f32,
+            share: (area(film.width, film.height) / area(all.width, all.height)) as f32,
+        }
+    }
+
+    fn on(&self, film: glam::Vec2) -> [f32; 2] {
+        (film * self.size + self.margin).to_array()
+    }
+}
+
 /// Where samples go.
 pub(super) trait Sink {
+    /// Light that came to a place of the film, in pixels: its colours.
+    fn splat(&mut self, _place: [f32; 2], _colors: &[f32]) {
+        unreachable!("where samples are taken block by block no light is traced");
+    }
     /// What they cost.
     fn tally(&mut self) -> &mut Tally;
     /// The next samples of a pixel, whose values stand in a row a channel.

@@ -17,7 +17,7 @@ use super::options::{Adaptive, Options};
 use super::origin::Outcome;
 use super::part::{self, Head, Made, Noise, Passes};
 use super::pinned;
-use super::plan::{Completed, Plan};
+use super::plan::Completed;
 use super::prepare::{self, Ask, Facts, Job, Shelf, View};
 use super::progress::Progress;
 use super::provenance::{self, Provenance};
@@ -211,8 +211,14 @@ impl Task for Part<'_> {
         };
         let all_passes = match &ladder {
             Some((_, ladder)) => ladder.passes(),
-            None => Plan::new(film, spp).passes(),
+            None => job.plan(spp).passes(),
         };
+        let passes = self.passes.within(all_passes)?;
+        if passes.start > 0 && job.view.integrator.traces_light() {
+            let message = "light that is traced comes to the whole film, and later passes cannot be kept apart";
+            return Err(Error::input(message)
+                .help("leave out --passes; crops can be rendered by themselves"));
+        }
         let whole = provenance::without_crop(description, film);
         let head = Head {
             fingerprint: job.fingerprint(&whole, options)?,
@@ -225,7 +231,7 @@ impl Task for Part<'_> {
                 threshold: adaptive.noise_threshold,
                 limits: ladder.limits(),
             }),
-            passes: self.passes.within(all_passes)?,
+            passes,
             all_passes,
         };
         let mut seconds = job.spent;

@@ -22,7 +22,7 @@ pub(super) fn render<C: ColorModel>(
     progress: &dyn Progress,
     mut keeper: Option<&mut Keeper>,
 ) -> Result<(Summed<Sums>, Completed)> {
-    let plan = Plan::new(&job.view.film, job.view.sampler.sample_count());
+    let plan = job.plan(job.view.sampler.sample_count());
     let mut summed = Summed {
         sums: Sums::new(job.view.film.shown(), job.layout())?,
         next: 0,
@@ -69,6 +69,12 @@ pub(super) fn render_unit<C: ColorModel>(
         fn tally(&mut self) -> &mut Tally {
             &mut self.0.tally
         }
+        fn splat(&mut self, place: [f32; 2], colors: &[f32]) {
+            if !self.0.splats.push(place, colors) {
+                let pixel = place.map(|x| if x > 0.0 { x as u32 } else { 0 });
+                self.0.tally.drop(pixel, 1);
+            }
+        }
         fn take(&mut self, kernel: Kernel, group: &Group, values: &[[f32; GROUP]]) {
             self.0.splat(kernel, self.1, group, values);
         }
@@ -76,9 +82,10 @@ pub(super) fn render_unit<C: ColorModel>(
     let film = &job.view.film;
     let (tile, indices) = plan.unit(unit);
     let reach = tile.grown(film.filter.reach(), &film.sampled());
-    let sums = Sums::new(reach, job.layout()).expect("a tile is small");
-    let mut sink = Splat(sums, &film.filter);
+    let mut sums = Sums::new(reach, job.layout()).expect("a tile is small");
     let own = tile.grown(0, &plan.needed);
+    sums.begin_splats(&film.filter, &own, indices.len() as u32);
+    let mut sink = Splat(sums, &film.filter);
     let pixels = (own.y..own.y + own.height)
         .flat_map(|y| (own.x..own.x + own.width).map(move |x| [x, y]))
         .map(|pixel| (pixel, indices.clone()));

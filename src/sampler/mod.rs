@@ -231,6 +231,15 @@ impl Stream {
         }
     }
 
+    /// The stream of another path that belongs to the same sample.
+    #[must_use]
+    pub fn other(&self, path: u64) -> Self {
+        Self {
+            key: math::random::key(self.key, path),
+            ..*self
+        }
+    }
+
     /// Its number in `dimension`.
     pub fn number(&self, sampler: &Sampler, dimension: u32) -> f32 {
         sampler.number::<f32>(Streams::of(&[*self]), dimension)

@@ -4,7 +4,7 @@
 use std::collections::{HashMap, HashSet};
 
 use super::assets::{MAX_SHAPES, Member};
-use super::choice::Choice;
+use super::choice::{Choice, Power};
 use super::{Assets, Boundary, LightId, MaterialId, MediumId, Scene, Surfacing};
 use crate::accel::{Recipe, Tracer};
 use crate::color::ColorModel;
@@ -359,13 +359,18 @@ pub fn build<C: ColorModel>(
         assets.instances.clone(),
         recipe,
     );
-    let choice = Choice::new(&lights, &weights, &color, tracer.bounds());
+    let chosen = |power: Power<C>| Choice::new(&lights, &weights, power, &color, tracer.bounds());
+    let (choice, departures) = (
+        chosen(|light, color, radius| light.power(color, radius)),
+        chosen(|light, color, radius| light.emitted_power(color, radius)),
+    );
     Ok(Scene {
         color,
         tracer,
         materials,
         lights,
         choice,
+        departures,
         ambients,
         environment: environment.map(|(id, _)| id),
         media,

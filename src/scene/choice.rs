@@ -23,6 +23,9 @@ pub(super) struct Choice {
 /// Up to so many starts are looked at one after another; more are searched by halves.
 const FEW: usize = 8;
 
+/// What a light gives to a scene of some radius.
+pub(super) type Power<C> = fn(&Light<C>, &C, f64) -> f64;
+
 /// The share of the choices that does not look at power.
 const EVEN: f64 = 0.5;
 
@@ -31,6 +34,7 @@ impl Choice {
     pub(super) fn new<C: ColorModel>(
         lights: &[Light<C>],
         weights: &[f64],
+        power: Power<C>,
         color: &C,
         bounds: Bounds,
     ) -> Self {
@@ -41,7 +45,7 @@ impl Choice {
         };
         let powers: Vec<f64> = lights
             .iter()
-            .map(|light| Some(light.power(color, radius)).filter(|p| p.is_finite()))
+            .map(|light| Some(power(light, color, radius)).filter(|p| p.is_finite()))
             .map(|power| power.unwrap_or(0.0))
             .collect();
         let local = || {

@@ -5,6 +5,7 @@ mod assets;
 mod build;
 mod choice;
 mod displacement;
+mod emission;
 mod files;
 
 use std::collections::HashMap;
@@ -16,7 +17,7 @@ use crate::color::{ColorModel, Spectral};
 use crate::description::NodeId;
 use crate::error::Problem;
 use crate::interaction::{Hit, Interaction, Points, Ray};
-use crate::lanes::{self, Ints as _, Kernel, Lanes, Mask as _};
+use crate::lanes::{self, Ints, Kernel, Lanes, Mask as _};
 use crate::light::{Light, LightSamples};
 use crate::material::Material;
 use crate::medium::Medium;
@@ -42,6 +43,11 @@ impl MaterialId {
 pub struct LightId(u32);
 
 impl LightId {
+    /// Of a light's place among [`Scene::lights`].
+    pub(crate) fn new(index: u32) -> Self {
+        Self(index)
+    }
+
     /// The light's place among [`Scene::lights`].
     pub fn index(self) -> usize {
         self.0 as usize
@@ -86,6 +92,9 @@ struct Surfacing {
     boundary: Option<Boundary>,
 }
 
+/// An index a lane.
+pub type Indices<F> = <<F as Lanes>::Int as Ints>::Row;
+
 /// A scene whose colours are in the stored form of `C`.
 #[derive(Debug)]
 pub struct Scene<C: ColorModel> {
@@ -94,6 +103,8 @@ pub struct Scene<C: ColorModel> {
     materials: Vec<Material<C>>,
     lights: Vec<Light<C>>,
     choice: Choice,
+    /// Of lights that paths set out from.
+    departures: Choice,
     /// Never chosen, for they are nowhere.
     ambients: Vec<Light<C>>,
     environment: Option<LightId>,
@@ -275,11 +286,23 @@ impl<C: ColorModel> Scene<C> {
         u2: lanes::Vec2<F>,
         w: &[C::Wavelengths],
     ) -> LightSamples<F, C::Columns<F>> {
+        self.sample_chosen_lights(from, u1, u2, w).0
+    }
+
+    /// The same, and the indices of the lights.
+    #[inline(always)]
+    pub fn sample_chosen_lights<F: Lanes>(
+        &self,
+        from: &Points<'_, F>,
+        u1: F,
+        u2: lanes::Vec2<F>,
+        w: &[C::Wavelengths],
+    ) -> (LightSamples<F, C::Columns<F>>, Indices<F>) {
         let mut samples = LightSamples::none();
-        let Some(chosen) = self.choice.sample(u1) else {
-            return samples;
-        };
         let mut indices = F::Int::ROW;
+        let Some(chosen) = self.choice.sample(u1) else {
+            return (samples, indices);
+        };
         chosen.store(&mut indices);
         // One light after another.
         let mut rest = from.active;
@@ -291,7 +314,7 @@ impl<C: ColorModel> Scene<C> {
             drawn.pdf = drawn.pdf * F::splat(self.choice.probability(light));
             samples = LightSamples::select(mask, drawn, samples);
         }
-        samples
+        (samples, indices)
     }
 
     /// Radiance that the surface at `at` emits toward `at.wi`, and the density with which

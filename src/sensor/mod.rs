@@ -41,6 +41,20 @@ pub trait Camera: std::fmt::Debug + Send + Sync {
     fn weight(&self, _film: Vec2) -> f32 {
         1.0
     }
+    /// The way back: the ray of the sensor's through the lens point `lens` that comes to `from`. `None` where none does, and
+    /// of sensors that light does not find.
+    fn connect(&self, _from: Vec3, _lens: Vec2, _time: f32) -> Option<Connection> {
+        None
+    }
+    /// The density of the sensor's rays, whose places on the film are even, where they come to `at` against `direction`: per
+    /// unit area at right angles.
+    fn density(&self, _at: Vec3, _direction: Vec3, _time: f32) -> f32 {
+        0.0
+    }
+    /// Whether light finds the sensor, by [`Camera::connect`].
+    fn is_found(&self) -> bool {
+        false
+    }
     /// From world to camera space at `time`: z forward, y up, x to the image's left.
     fn world_to_camera(&self, time: f32) -> Mat4;
     /// From camera space to clip space: x right and y up in [−1, 1], z in [0, 1] from near to far.
@@ -50,6 +64,19 @@ pub trait Camera: std::fmt::Debug + Send + Sync {
     fn neighbours(&self, ray: &Ray, step: Vec2) -> [Ray; 2];
     /// When the shutter is open: (open, close).
     fn shutter(&self) -> (f32, f32);
+}
+
+/// A sensor as seen from a place.
+#[derive(Clone, Copy, Debug)]
+pub struct Connection {
+    /// The place on the film, as in [`Camera::ray`]; it may lie beside that.
+    pub film: Vec2,
+    /// Where the sensor's ray begins; world space.
+    pub target: Vec3,
+    /// Toward there, unit length.
+    pub direction: Vec3,
+    /// See [`Camera::density`].
+    pub density: f32,
 }
 
 family! {
@@ -181,6 +208,33 @@ impl Mount {
         }
     }
 
+    /// The density of rays in a world direction where the whole film covers `area`.
+    fn density(to_world: &Transform, direction: Vec3, area: f32) -> f32 {
+        let linear = to_world.linear();
+        let across = linear.x_axis.cross(linear.y_axis).dot(direction).abs();
+        (across * area).recip()
+    }
+
+    /// The connection of `from` with the camera-space point `start`, of a ray through the place `film`; the whole film covers
+    /// `area` where `from` lies, at right angles to the camera's axis and in its space.
+    fn connect(
+        to_world: &Transform,
+        from: Vec3,
+        start: Vec3,
+        film: Vec2,
+        area: f32,
+    ) -> Option<Connection> {
+        let target = to_world.point(start);
+        let direction = (target - from).try_normalize()?;
+        let density = Self::density(to_world, direction, area);
+        (density.is_finite() && film.is_finite()).then_some(Connection {
+            film,
+            target,
+            direction,
+            density,
+        })
+    }
+
     /// Where rays from camera-space points to others start, their directions and their lengths.
     #[inline(always)]
     fn place<F: Lanes>(
@@ -269,6 +323,41 @@ mod tests {
                         "{name}: {found} {expected}"
                     );
                 }
+            }
+        }
+    }
+
+    /// What a ray comes to is connected with the place on the film and the point of the lens that it went through.
+    #[test]
+    fn every_camera_is_found_where_its_rays_come_from() {
+        let film = Film {
+            width: 200,
+            height: 100,
+            ..Film::default()
+        };
+        for (name, sensor) in every_camera(&film) {
+            assert!(sensor.is_found(), "{name}");
+            let lens = Vec2::new(0.3, 0.8);
+            for place in [Vec2::splat(0.5), Vec2::new(0.8, 0.3), Vec2::new(0.01, 0.99)] {
+                let ray = sensor.ray(place, lens, 0.0);
+                let (from, step) = (ray.at(2.0), 1e-2);
+                let found = sensor.connect(from, lens, 0.0).unwrap();
+                assert!((found.film - place).length() < 1e-4, "{name} {found:?}");
+                assert!(found.target.distance(ray.origin) < 1e-4, "{name} {found:?}");
+                assert!(found.direction.distance(-ray.direction) < 1e-4, "{name}");
+                // The area at right angles that a piece of the film covers, by neighbours through the same point of the lens.
+                let beside = |x, y| {
+                    let ray = sensor.ray(place + step * Vec2::new(x, y), lens, 0.0);
+                    let way = from - ray.origin;
+                    let t = way.dot(found.direction) / ray.direction.dot(found.direction);
+                    ray.at(t)
+                };
+                let [right, left] = [beside(1.0, 0.0), beside(-1.0, 0.0)];
+                let [down, up] = [beside(0.0, 1.0), beside(0.0, -1.0)];
+                let area = (right - left).cross(down - up).length() / (4.0 * step * step);
+                assert_eq!(found.density, sensor.density(from, found.direction, 0.0));
+                let product = area * found.density;
+                assert!((product - 1.0).abs() < 1e-2, "{name} {product}");
             }
         }
     }

@@ -3,7 +3,7 @@
 
 use glam::{Mat4, Vec2, Vec3, Vec4};
 
-use super::{Camera, Film, Mount};
+use super::{Camera, Connection, Film, Mount};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, float};
 use crate::error::Result;
@@ -40,6 +40,11 @@ impl Orthographic {
 }
 
 impl Orthographic {
+    /// What the film covers, in camera space.
+    fn area(&self) -> f32 {
+        4.0 * self.half.x * self.half.y
+    }
+
     /// In camera space, the ways from near to far.
     #[inline(always)]
     pub(super) fn segments<F: Lanes>(&self, film: lanes::Vec2<F>) -> [lanes::Vec3<F>; 2] {
@@ -54,6 +59,26 @@ impl Camera for Orthographic {
     fn ray(&self, film: Vec2, _lens: Vec2, time: f32) -> Ray {
         let [start, end] = self.segments::<f32>(film.into());
         self.mount.ray(start.into(), end.into(), time)
+    }
+
+    fn connect(&self, from: Vec3, _lens: Vec2, time: f32) -> Option<Connection> {
+        let Mount { near, far, .. } = self.mount;
+        let to_world = self.mount.to_world.at(time);
+        let local = to_world.inverse().point(from);
+        if !(near..=far).contains(&local.z) {
+            return None;
+        }
+        let p = local.truncate();
+        let film = 0.5 * (Vec2::ONE - p / self.half);
+        Mount::connect(&to_world, from, p.extend(near), film, self.area())
+    }
+
+    fn density(&self, _at: Vec3, direction: Vec3, time: f32) -> f32 {
+        Mount::density(&self.mount.to_world.at(time), direction, self.area())
+    }
+
+    fn is_found(&self) -> bool {
+        true
     }
 
     fn neighbours(&self, ray: &Ray, step: Vec2) -> [Ray; 2] {

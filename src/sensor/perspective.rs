@@ -5,7 +5,7 @@
 
 use glam::{Mat4, Vec2, Vec3, Vec4};
 
-use super::{Camera, Film, Mount};
+use super::{Camera, Connection, Film, Mount};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, Row, choice, float, string};
 use crate::error::{Error, Result};
@@ -166,6 +166,33 @@ impl Perspective {
         })
     }
 
+    /// The connection through a point of the lens, as [`Self::segments_through`] has them.
+    pub(super) fn connect_through(
+        &self,
+        from: Vec3,
+        lens: Vec2,
+        focus: f32,
+        time: f32,
+    ) -> Option<Connection> {
+        let Mount { near, far, .. } = self.mount;
+        let to_world = self.mount.to_world.at(time);
+        let local = to_world.inverse().point(from);
+        if !(near..=far).contains(&local.z) {
+            return None;
+        }
+        // At depth 1.
+        let way = (local.truncate() - lens) / local.z;
+        let place = Vec2::ONE - (way + lens / focus) / self.half;
+        let film = 0.5 * place - self.principal_point;
+        let start = (lens + way * near).extend(near);
+        Mount::connect(&to_world, from, start, film, self.area(local.z))
+    }
+
+    /// What the film covers at a depth, in camera space.
+    fn area(&self, depth: f32) -> f32 {
+        4.0 * self.half.x * self.half.y * depth * depth
+    }
+
     /// The near clipping distance.
     pub(super) fn near(&self) -> f32 {
         self.mount.near
@@ -181,6 +208,20 @@ impl Camera for Perspective {
     fn ray(&self, film: Vec2, _lens: Vec2, time: f32) -> Ray {
         let [start, end] = self.segments::<f32>(film.into());
         self.mount.ray(start.into(), end.into(), time)
+    }
+
+    fn connect(&self, from: Vec3, _lens: Vec2, time: f32) -> Option<Connection> {
+        self.connect_through(from, Vec2::ZERO, 1.0, time)
+    }
+
+    fn density(&self, at: Vec3, direction: Vec3, time: f32) -> f32 {
+        let to_world = self.mount.to_world.at(time);
+        let depth = to_world.inverse().point(at).z;
+        Mount::density(&to_world, direction, self.area(depth))
+    }
+
+    fn is_found(&self) -> bool {
+        true
     }
 
     /// All begin where `ray` does, as in Mitsuba.

@@ -9,11 +9,11 @@
 
 use std::f32::consts::TAU;
 
-use glam::{Mat4, Vec2};
+use glam::{Mat4, Vec2, Vec3};
 
 use super::Mount;
 use super::perspective::Perspective;
-use super::{Camera, Film};
+use super::{Camera, Connection, Film};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, float, integer};
 use crate::error::Result;
@@ -152,6 +152,20 @@ impl Camera for ThinLens {
         self.mount().ray(start.into(), end.into(), time)
     }
 
+    fn connect(&self, from: Vec3, lens: Vec2, time: f32) -> Option<Connection> {
+        let lens = self.aperture.point::<f32>(lens.into()).into();
+        self.pinhole
+            .connect_through(from, lens, self.focus_distance, time)
+    }
+
+    fn density(&self, at: Vec3, direction: Vec3, time: f32) -> f32 {
+        self.pinhole.density(at, direction, time)
+    }
+
+    fn is_found(&self) -> bool {
+        true
+    }
+
     /// All go through one point of the lens.
     fn neighbours(&self, ray: &Ray, step: Vec2) -> [Ray; 2] {
         self.pinhole.rays_beside(ray, step, self.pinhole.near())
@@ -177,8 +191,6 @@ impl Camera for ThinLens {
 #[cfg(test)]
 mod tests {
     use std::path::Path;
-
-    use glam::Vec3;
 
     use super::*;
     use crate::description::{Description, Kind, Options};

@@ -120,9 +120,11 @@ fn integrator(name: &str, known: &Known) -> (String, f64) {
     let path = format!(r#"<integrator type="path">{roulette}</integrator>"#);
     match name {
         "path" => (path, known.path),
-        "volpath" | "volpathmis" => {
-            let volpath = format!(r#"<integrator type="{name}">{roulette}</integrator>"#);
-            (volpath, known.path)
+        // Of what comes from the lights next to nothing falls on so small a film.
+        "ptracer" => (path, f64::NAN),
+        "bdpt" | "volpath" | "volpathmis" => {
+            let named = format!(r#"<integrator type="{name}">{roulette}</integrator>"#);
+            (named, known.path)
         }
         "direct" => (r#"<integrator type="direct"/>"#.into(), known.direct),
         "phong" => (

@@ -18,6 +18,7 @@ mod inputs;
 mod instances;
 mod known_radiance;
 mod layers;
+mod light_tracing;
 mod lights;
 mod media;
 mod memory;

@@ -167,10 +167,7 @@ fn seen(text: &str, targets: &[DVec3]) -> Vec<[f32; 3]> {
         stream: Stream::new(1, 0, 0, 0),
     };
     let starts: Vec<_> = targets.iter().map(start).collect();
-    let mut estimates = Estimates {
-        values: Vec::new(),
-        extra: Vec::new(),
-    };
+    let mut estimates = Estimates::default();
     integrator.estimate(
         &built,
         &sampler,

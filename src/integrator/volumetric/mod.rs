@@ -184,7 +184,7 @@ impl Volumetric {
         let mean = Mean::of(scene.color());
         let channels = 1.0 / mean.share;
         let medium = self.medium.and_then(|node| scene.medium_of(node));
-        let mut wave = Wave::carrying(scene, sampler, starts, |start| Carried {
+        let mut wave = Wave::carrying(scene, sampler, starts, |_, start| Carried {
             medium,
             hero: match scene.medium_count() {
                 0 => 0,

@@ -7,7 +7,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use super::super::adaptive::{self, Ladder, Rest};
-use super::super::plan::{Completed, Plan};
+use super::super::plan::Completed;
 use super::super::prepare::Job;
 use super::super::progress::{Phase, Progress};
 use super::super::{uniform, unit};
@@ -76,7 +76,7 @@ fn uniformly<C: ColorModel>(
     progress: &dyn Progress,
 ) -> Result<Made> {
     let film = &job.view.film;
-    let plan = Plan::new(film, head.spp);
+    let plan = job.plan(head.spp);
     let units = plan.units_of(head.passes.clone());
     let shown = film.shown();
     let mut sums = match head.passes.start {
