@@ -146,7 +146,8 @@ mod tests {
     use super::*;
     use crate::color::Rgb;
     use crate::description::{Description, Kind, Options};
-    use crate::integrator::{Context, Integrator};
+    use crate::integrator::{Context, Integrator, Lens};
+    use crate::sensor::{Film, Sensor};
 
     fn integrator(name: &str, inside: &str) -> Description {
         let nested = match name {
@@ -159,6 +160,18 @@ mod tests {
         Description::parse(&text, Path::new("test.xml"), &Options::default()).unwrap()
     }
 
+    /// With a sensor that light finds.
+    fn context() -> Context {
+        let text = "<scene version='3.0.0'><sensor type='perspective'/></scene>";
+        let scene = Description::parse(text, Path::new("test.xml"), &Options::default()).unwrap();
+        let film = Film::default();
+        let sensor = Sensor::build(&scene.root().children(Kind::Sensor)[0], &film).unwrap();
+        Context {
+            lens: Lens::new(&sensor, &film),
+            ..Context::default()
+        }
+    }
+
     #[test]
     fn every_integrator_reads_what_mitsuba_s_do() {
         let inside =
@@ -167,7 +180,7 @@ mod tests {
         for name in Integrator::<Rgb>::NAMES {
             let scene = integrator(name, inside);
             let properties = &scene.root().children(Kind::Integrator)[0];
-            Integrator::<Rgb>::build(properties, &Context::default())
+            Integrator::<Rgb>::build(properties, &context())
                 .unwrap_or_else(|e| panic!("{name}: {e}"));
             let note = timeout_note(properties).unwrap().unwrap();
             assert!(note.to_string().contains("timeout does not end"), "{note}");

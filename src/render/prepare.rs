@@ -565,16 +565,11 @@ fn light_anywhere<C: ColorModel>(
     integrator: &Integrator<C>,
     name: &str,
 ) -> Result<()> {
-    if !integrator.traces_light() {
+    if !integrator.traces_light() || options.adaptive.is_none() {
         return Ok(());
     }
-    let option = match options {
-        _ if options.adaptive.is_some() => "--noise-threshold",
-        _ => return Ok(()),
-    };
-    let message =
-        format!("light of {name} comes to the whole film, and {option} is about some of it");
-    Err(Error::input(message).help("--integrator path takes it"))
+    let message = format!("light of {name} comes to the whole film, and is not sampled adaptively");
+    Err(Error::input(message).help("leave out --noise-threshold, or take --integrator path"))
 }
 
 /// The channels of samples.

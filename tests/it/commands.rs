@@ -86,7 +86,6 @@ const CASES: &[(&str, &str, &str, bool)] = &[
     (INTEGRATOR, r#"<integrator type="pahth"/>"#, "", false),
     (INTEGRATOR, r#"<integrator type="volpath"/>"#, "", true),
     (INTEGRATOR, r#"<integrator type="ptracer"/>"#, "", true),
-    ("", "", "--integrator bdpt --noise-threshold 0.1", false),
     (INTEGRATOR, r#"<integrator type="prbvolpath"/>"#, "", false),
     (
         "\"grey\"/>",

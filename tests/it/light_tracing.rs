@@ -7,10 +7,10 @@ use std::path::Path;
 use etendue::color::Rgb;
 use etendue::image::Image;
 use etendue::light::Light;
-use etendue::render::{Options, Overrides};
+use etendue::render::{Adaptive, Options, Overrides, Silent, render};
 use etendue::sensor::Window;
 
-use super::support::{Mean, image_of, rendered, scene};
+use super::support::{Mean, describe, image_of, rendered, scene};
 
 fn integrator(name: &str, depth: i32) -> String {
     format!(r#"<integrator type="{name}"><integer name="max_depth" value="{depth}"/></integrator>"#)
@@ -234,6 +234,38 @@ fn lights_that_are_hidden_hide_nothing_from_the_light() {
             found.assert_equals(expected, 0.02, name);
         }
     }
+}
+
+#[test]
+fn what_does_not_go_with_light_from_anywhere_is_refused() {
+    let text = scene(&format!(
+        "{}{}{FLOOR}{LAMP}",
+        integrator("bdpt", 4),
+        camera("perspective", 4, "")
+    ));
+    let adaptive = Some(Adaptive {
+        noise_threshold: 0.1,
+        min_spp: 4,
+        max_spp: 16,
+    });
+    let options = Options {
+        adaptive,
+        ..Options::default()
+    };
+    let refused = render(&describe(&text), &options, &Silent).unwrap_err();
+    assert!(
+        refused.to_string().contains("not sampled adaptively"),
+        "{refused}"
+    );
+    let blind = text
+        .replace("perspective", "radiancemeter")
+        .replace("\"12\"", "\"1\"")
+        .replace("\"10\"", "\"1\"");
+    let refused = render(&describe(&blind), &Options::default(), &Silent).unwrap_err();
+    assert!(
+        refused.to_string().contains("a sensor that light finds"),
+        "{refused}"
+    );
 }
 
 #[test]
