@@ -5,6 +5,8 @@
 //!
 //! Without a file the mesh is a bumpy sphere. Motion is small against the mesh, so that rays meet much the same.
 
+#![allow(clippy::print_stdout)] // a bench's business
+
 use std::path::Path;
 use std::sync::Arc;
 

@@ -64,6 +64,10 @@ struct RtcRayHit16 {
     instance_primitive: [c_uint; 16],
 }
 
+/// Which rays of sixteen there are; Embree wants it aligned as it wants the rays.
+#[repr(align(64))]
+struct Valid([c_int; 16]);
+
 /// `RTCIntersectArguments`.
 #[repr(C)]
 struct RtcArguments {
@@ -437,7 +441,7 @@ impl Peer for Packets {
     }
 
     fn closest(&self, batch: &Batch<'_>, hits: &mut Vec<Hit>) {
-        const VALID: [c_int; 16] = [-1; 16];
+        const VALID: Valid = Valid([-1; 16]);
         let intersect = self.0.device.embree.0.rtcIntersect16;
         let arguments = RtcArguments {
             flags: COHERENT,
@@ -468,7 +472,7 @@ impl Peer for Packets {
             // SAFETY: as in `Scene::occluded`; packet and arguments live through the call.
             unsafe {
                 intersect(
-                    VALID.as_ptr(),
+                    VALID.0.as_ptr(),
                     self.0.handle,
                     &raw mut met,
                     &raw const arguments,

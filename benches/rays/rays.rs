@@ -6,7 +6,8 @@
 //! the first bounce; from that one's hits the second.
 
 use etendue::interaction::{Hit, Ray};
-use etendue::math::{Frame, random, warp};
+use etendue::lanes::warp;
+use etendue::math::{Frame, random};
 use glam::{Vec2, Vec3};
 
 use crate::peer::Peer;
@@ -226,7 +227,8 @@ fn spread<T>(points: &[T], count: usize) -> impl Iterator<Item = (u32, &T)> {
 
 fn cosine(normal: Vec3, seed: u64, i: u32) -> Vec3 {
     let unit = |dimension| random::unit(random::bits(random::key(seed, u64::from(i)), dimension));
-    Frame::around(normal).to_world(warp::cosine_hemisphere(Vec2::new(unit(0), unit(1))))
+    let local = warp::cosine_hemisphere::<f32>(Vec2::new(unit(0), unit(1)).into());
+    Frame::around(normal).to_world(local.into())
 }
 
 /// Of unit length.

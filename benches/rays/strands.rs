@@ -9,6 +9,7 @@ use std::time::Instant;
 
 use etendue::description::{Description, Kind, Options};
 use etendue::interaction::{Hit, Ray};
+use etendue::lanes::warp;
 use etendue::math::{Frame, random};
 use etendue::shape::{self, Geometry};
 use glam::{Vec2, Vec3, Vec4};
@@ -41,7 +42,8 @@ impl Strands {
             let unit = |dimension| {
                 random::unit(random::bits(random::key(1, u64::from(strand)), dimension))
             };
-            let root = etendue::math::warp::uniform_sphere(Vec2::new(unit(0), unit(1)));
+            let root = warp::uniform_sphere::<f32>(Vec2::new(unit(0), unit(1)).into());
+            let root = Vec3::from(root);
             let frame = Frame::around(root);
             let (turn, curl) = (TAU * unit(2), 0.02 + 0.04 * unit(3));
             starts.extend((0..OF_STRAND).map(|i| points.len() as u32 + i));
@@ -66,7 +68,8 @@ impl Strands {
         let per_strand = OF_STRAND as usize + 3;
         let mut text = String::new();
         for strand in self.points.chunks(per_strand) {
-            for Vec4 { x, y, z, w } in strand {
+            for point in strand {
+                let [x, y, z, w] = point.to_array();
                 writeln!(text, "{x} {y} {z} {w}").expect("a string takes all");
             }
             text.push('\n');
