@@ -18,6 +18,7 @@ import time
 from pathlib import Path
 from unittest import mock
 
+import dask
 from distributed import Client, LocalCluster
 
 import etendue
@@ -142,6 +143,62 @@ exec '{etendue.command()}' "$@"
     assert report.units["skipped"] > 0, report.units
 
 
+# Stands in for `sbatch` and `scancel`: a job is a session of its own.
+BATCH_SYSTEM = f"""#!{sys.executable}
+import os, shutil, signal, subprocess, sys
+folder, name = os.path.split(os.path.abspath(sys.argv[0]))
+if name == "scancel":
+    os.killpg(int(sys.argv[1]), signal.SIGKILL)
+elif os.path.exists(folder + "/refuses"):
+    sys.exit("sbatch: error: invalid partition")
+else:
+    script = shutil.copy(sys.argv[1], folder)
+    job = subprocess.Popen(["bash", script], start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    print("Submitted batch job", job.pid)
+"""
+
+
+def lost_jobs(_client, place, options):
+    """The only job of a batch system is cancelled and gets a successor; a job that is not taken is an error."""
+    whole = place.whole()
+    options.say = Said()
+    system = place.folder / "system"
+    system.mkdir()
+    for name in ("sbatch", "scancel"):
+        (system / name).write_text(BATCH_SYSTEM)
+        (system / name).chmod(0o755)
+    refuses = system / "refuses"
+    refuses.touch()
+
+    def cancel(client, made):
+        while not any(client.processing().values()):
+            time.sleep(0.01)
+        (job,) = made.workers.values()
+        subprocess.run(["scancel", job.job_id], check=True)
+
+    path = f"{system}:{os.environ['PATH']}"
+    soon = dask.config.set({"distributed.deploy.lost-worker-timeout": "1s"})
+    with mock.patch.dict(os.environ, PATH=path), mock.patch.object(farm, "REPLACE_SECONDS", 0.2), soon:
+        try:
+            farm.cluster("slurm", 1, cores=1, memory="1GB").close()
+        except farm.ClusterError as error:
+            assert "invalid partition" in str(error), error
+        else:
+            raise AssertionError("a job that is not taken is no error")
+        refuses.unlink()
+        made = farm.cluster("slurm", 1, cores=1, memory="1GB")
+        try:
+            with Client(made) as client:
+                thread = threading.Thread(target=cancel, args=(client, made), daemon=True)
+                thread.start()
+                report = farm.render(place.job, client, options)
+                thread.join()
+        finally:
+            made.close()
+    place.check(whole, report)
+    assert report.lost_workers, report
+
+
 def one_in_ten_fails(client, place, options):
     """Every image that can be is there, and the report names the others."""
     count = options.count
@@ -162,6 +219,7 @@ def one_in_ten_fails(client, place, options):
 TESTS = {
     "same_bits": (same_bits, list(KINDS)),
     "bad_luck": (bad_luck, ["rgb", "adaptive"]),
+    "lost_jobs": (lost_jobs, ["rgb", "adaptive"]),
     "one_in_ten_fails": (one_in_ten_fails, ["rgb"]),
 }
 

@@ -11,6 +11,7 @@ again.
 """
 
 import argparse
+import contextlib
 import json
 import os
 import queue
@@ -20,12 +21,16 @@ import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from tornado.ioloop import PeriodicCallback
+
 import etendue
 from etendue import units as cutting
 from etendue import work
 
 # Processor seconds of a unit, where nothing else is said: enough that loading a scene does not count.
 UNIT_SECONDS = 60.0
+# A batch system is asked so often for new jobs in place of those that ended; Dask gives a lost one up after 15 seconds.
+REPLACE_SECONDS = 10.0
 # A line of progress comes when so many seconds have passed and so much of the units is done, or after a minute.
 LINE_SECONDS, LINE_SHARE, LONGEST_SILENCE = 10.0, 0.05, 60.0
 
@@ -252,7 +257,8 @@ class _Farm:
         elapsed = self.told - self.began
         left = f", about {elapsed * (1 - share) / share:.0f} s left" if share > 0 else ""
         there = sum(image["status"] != "failed" for image in self.report.images)
-        self.options.say(f"{done} of {self.counts['units']} units, {there} images are there{left}")
+        idle = "" if self.client.scheduler_info()["workers"] else "; no worker is there"
+        self.options.say(f"{done} of {self.counts['units']} units, {there} images are there{left}{idle}")
 
     def _remove_parts_folder(self):
         """What is left there is what killed processes had begun to write."""
@@ -262,9 +268,13 @@ class _Farm:
             shutil.rmtree(self.folder, ignore_errors=True)
 
 
+class ClusterError(Exception):
+    """There is no cluster; the text is what the batch system says."""
+
+
 def cluster(kind: str, workers: int | None, **options):
     """A cluster of `workers`: "local" (a process a worker, by default one a processor), "slurm" or "pbs", whose options
-    are those of dask-jobqueue."""
+    are those of dask-jobqueue. ClusterError where the batch system takes no job."""
     if kind == "local":
         from distributed import LocalCluster
 
@@ -279,8 +289,32 @@ def cluster(kind: str, workers: int | None, **options):
     # One unit a worker at a time: its processors are the command's.
     one = {"processes": 1, "worker_extra_args": ["--nthreads", "1"]}
     made = kinds[kind](**{**one, **given})
-    made.scale(jobs=workers or 1)
+    _submit_jobs(made, workers or 1)
     return made
+
+
+def _submit_jobs(made, count: int):
+    """Keeps `count` jobs in the queue or at work. `scale` alone submits each of them once: when their time is over or
+    they were preempted, there would be no workers for the rest."""
+
+    async def submitted():
+        await made
+
+    # The first job as `scale` does it, which would not say that it failed.
+    made.worker_spec.update(made.new_worker_spec())
+    try:
+        made.sync(submitted)
+    except (RuntimeError, OSError) as error:
+        # Dask is not prepared for jobs that never were.
+        with contextlib.suppress(AssertionError):
+            made.close()
+        raise ClusterError(f"the batch system takes no job: {error}") from None
+
+    made.scale(jobs=count)
+    # A job that Dask has given up is submitted again by the same call.
+    again = PeriodicCallback(lambda: made.scale(jobs=count), 1000 * REPLACE_SECONDS)
+    made.periodic_callbacks["jobs"] = again
+    made.loop.add_callback(again.start)
 
 
 def _pair(text: str) -> tuple[int, int]:
@@ -327,7 +361,11 @@ def main() -> int:
     else:
         threads = threads or given.cores
         jobs = {"cores": given.cores, "memory": given.memory, "walltime": given.walltime, "queue": given.queue}
-        made = cluster(given.cluster, given.workers, **jobs)
+        try:
+            made = cluster(given.cluster, given.workers, **jobs)
+        except ClusterError as error:
+            print(error, file=sys.stderr)
+            return 1
     options = Options(
         folder=given.folder,
         seconds=given.seconds,
