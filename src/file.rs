@@ -73,7 +73,10 @@ pub(crate) fn seal(key: &blake3::Hash, sums: &[u32]) -> blake3::Hash {
 }
 
 /// Finds out, without leaving anything behind, whether `path` could be written.
-pub(crate) fn check_writable(path: &Path) -> Result<()> {
+///
+/// # Errors
+/// Where it could not.
+pub fn check_writable(path: &Path) -> Result<()> {
     let target = resolve(path)?;
     // Of folders that would be made, the one that they would be made in is tried.
     let folder = existing(folder_of(&target));

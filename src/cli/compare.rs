@@ -12,11 +12,12 @@ use etendue::compare::metric::Metric;
 use etendue::compare::pair;
 use etendue::compare::{Crop, Layer, Selection, flip, signed};
 use etendue::error::{Error, Result};
-use etendue::image::{self, Image};
+use etendue::image::{self, Encoding, Image};
 use etendue::sensor::Window;
 use serde_json::{Value, json};
 
 use super::memory::MemoryArguments;
+use super::page::{self, Page, Pair, Scene};
 use super::{output, parse, report, status};
 
 /// Find out whether images agree
@@ -82,13 +83,17 @@ pub(super) struct Arguments {
     /// against a reference
     #[arg(long, value_name = "PNG", help_heading = TELL)]
     map: Option<PathBuf>,
-    /// What the map of two images shows
-    #[arg(long, value_enum, requires = "map", conflicts_with_all = ["a", "reference"], help_heading = TELL)]
+    /// What the map of two images shows, and that of the page
+    #[arg(long, value_enum, conflicts_with_all = ["a", "reference"], help_heading = TELL)]
     map_of: Option<MapOf>,
     /// Draw where B is brighter than A (red) and where darker (blue), as PNG: (b − a) / (|a| + 1 % of its mean), by the
     /// luminance of colours, by that of other channels which differs most
     #[arg(long, value_name = "PNG", help_heading = TELL)]
     signed_map: Option<PathBuf>,
+    /// Write DIR/index.html, a page that needs no network: both images beside each other and in turns, both maps, and
+    /// what is found in words
+    #[arg(long, value_name = "DIR", help_heading = TELL)]
+    report: Option<PathBuf>,
     #[command(flatten)]
     memory: MemoryArguments,
     /// Print a JSON object
@@ -125,6 +130,7 @@ together.
 
 Examples:
   etendue compare reference.exr image.exr --fail-above relmse=0.01 --map map.png
+  etendue compare reference.exr image.exr --report page && xdg-open page/index.html
   etendue compare image.exr other.exr --layer albedo --crop 0,0,64,64 --json
   etendue compare --a a1.exr a2.exr a3.exr a4.exr --b b1.exr b2.exr b3.exr b4.exr
   etendue compare image.exr --reference mean.exr --variance variance.exr --spp 256
@@ -194,8 +200,27 @@ struct Outcome {
     sentence: String,
     /// Lines for people.
     lines: Vec<String>,
+    /// What a page says, with labels.
+    rows: Vec<(String, String)>,
     /// For programs.
     object: Value,
+    /// What was compared, where it is to be looked at.
+    difference: Option<Difference>,
+}
+
+/// Two images, the reference first, and where they differ.
+struct Difference {
+    images: [Image; 2],
+    /// What they are called in words, and their files.
+    sides: [(&'static str, String); 2],
+    encoding: Encoding,
+    /// The channels that are red, green and blue, if they are colours.
+    rgb: Option<[usize; 3]>,
+    /// How far apart they are, row by row, if somebody wants to see it, and what that is.
+    distance: Vec<f32>,
+    label: &'static str,
+    /// The distance that takes the last colour.
+    top: f32,
 }
 
 /// Runs the command; the answer is the exit status.
@@ -214,7 +239,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     };
     if arguments.json {
         let mut object = outcome.object;
-        object["verdict"] = if outcome.agrees { "agree" } else { "differ" }.into();
+        object["verdict"] = verdict(outcome.agrees).into();
         object["sentence"] = outcome.sentence.into();
         output::object(object);
     } else if !arguments.quiet {
@@ -235,6 +260,23 @@ fn compare(arguments: &Arguments) -> Result<Outcome> {
     {
         image::check_writable(map)?;
     }
+    if let Some(folder) = &arguments.report {
+        page::check_writable(folder)?;
+    }
+    if arguments.map_of.is_some() && arguments.map.is_none() && arguments.report.is_none() {
+        return Err(
+            Error::input("--map-of says what a map shows, and there is none")
+                .help("give --map too, or --report"),
+        );
+    }
+    let outcome = compared(arguments)?;
+    if let Some(difference) = &outcome.difference {
+        arguments.show(difference, &outcome)?;
+    }
+    Ok(outcome)
+}
+
+fn compared(arguments: &Arguments) -> Result<Outcome> {
     match (&arguments.reference, &arguments.images[..]) {
         (Some(reference), [image]) => known::against_reference(arguments, image, reference),
         (None, [a, b]) => two::two(arguments, a, b),
@@ -267,36 +309,91 @@ impl Arguments {
         }
     }
 
-    fn draw(&self, layer: &Layer, values: &[f32], label: &str, top: f32) -> Result<()> {
-        let Some(path) = &self.map else {
-            return Ok(());
-        };
-        let width = layer.image.width() as usize;
-        let map = Map {
-            width,
-            values,
-            label,
-            top,
-            scale: Scale::FromZero,
-        };
-        image::write_codes(path, &map.draw()?, image::Tag::Srgb)
+    /// Whether anybody wants to see where images differ.
+    fn shows(&self) -> bool {
+        self.shows_distance() || self.signed_map.is_some()
     }
 
-    /// Draws where `b` is brighter than `a`.
-    fn draw_signed(&self, a: &Image, b: &Image, rgb: Option<[usize; 3]>) -> Result<()> {
-        let Some(path) = &self.signed_map else {
-            return Ok(());
-        };
-        let values = signed::relative(a, b, rgb)?;
+    /// Whether anybody wants to see how far images are apart.
+    fn shows_distance(&self) -> bool {
+        self.map.is_some() || self.report.is_some()
+    }
+
+    /// Draws the maps and writes the page that are asked for.
+    fn show(&self, difference: &Difference, outcome: &Outcome) -> Result<()> {
+        let Difference {
+            images: [a, b],
+            rgb,
+            distance,
+            label,
+            top,
+            ..
+        } = difference;
         let map = Map {
             width: a.width() as usize,
-            values: &values,
-            label: "(b - a) / a",
-            top: robust_top(&values),
-            scale: Scale::AboutZero,
+            values: distance,
+            label,
+            top: *top,
+            scale: Scale::FromZero,
         };
-        image::write_codes(path, &map.draw()?, image::Tag::Srgb)
+        if let Some(path) = &self.map {
+            image::write_codes(path, &map.draw()?, image::Tag::Srgb)?;
+        }
+        if self.signed_map.is_none() && self.report.is_none() {
+            return Ok(());
+        }
+        let brighter = signed::relative(a, b, *rgb)?;
+        if let Some(path) = &self.signed_map {
+            let map = Map {
+                values: &brighter,
+                label: "(b - a) / a",
+                top: robust_top(&brighter),
+                scale: Scale::AboutZero,
+                ..map
+            };
+            image::write_codes(path, &map.draw()?, image::Tag::Srgb)?;
+        }
+        match &self.report {
+            Some(folder) => difference.page(outcome, &brighter, folder),
+            None => Ok(()),
+        }
     }
+}
+
+impl Difference {
+    /// Writes the page.
+    fn page(&self, outcome: &Outcome, brighter: &[f32], folder: &Path) -> Result<()> {
+        let [a, b] = &self.sides;
+        let mut lines = vec![("verdict".to_owned(), outcome.sentence.clone())];
+        lines.extend([a, b].map(|(side, files)| ((*side).to_owned(), files.clone())));
+        lines.extend(outcome.rows.iter().cloned());
+        let scene = Scene {
+            name: &format!("{} and {}", a.1, b.1),
+            status: verdict(outcome.agrees),
+            lines,
+            pair: Some(Pair {
+                reference: &self.images[0],
+                other: &self.images[1],
+                encoding: self.encoding,
+                rgb: self.rgb,
+                distance: &self.distance,
+                label: self.label,
+                top: self.top,
+                brighter,
+            }),
+        };
+        let page = Page {
+            title: "Images compared",
+            sides: [a.0, b.0],
+            scenes: vec![scene],
+        };
+        page.write(folder)
+    }
+}
+
+/// In a word.
+fn verdict(agrees: bool) -> &'static str {
+    if agrees { "agree" } else { "differ" }
 }
 
 /// The brightest |t| and |z| on a map: chance alone rarely reaches it.

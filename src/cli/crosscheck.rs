@@ -10,11 +10,12 @@ use etendue::error::{Error, Result};
 
 use super::oracle::Subject;
 use super::overrides::ImageArguments;
+use super::page::{self, Page};
 use super::progress::{self, Count, Steps, Told};
 use super::scene::ReadArguments;
 use super::stop::Stop;
 use super::verdicts::{self, Ending, Style};
-use super::{output, page, parse, status};
+use super::{output, parse, status};
 
 /// Hold scenes against what Mitsuba renders, or rays against the z-buffer, and say whether they agree
 ///
@@ -209,6 +210,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
 }
 
 fn beside_mitsuba(arguments: &Arguments, told: Told) -> Result<u8> {
+    if let Some(folder) = &arguments.report {
+        page::check_writable(folder)?;
+    }
     let folders = folders(&arguments.scenes);
     let mut settings = match arguments.settings() {
         Ok(settings) => settings,
@@ -249,11 +253,13 @@ fn beside_mitsuba(arguments: &Arguments, told: Told) -> Result<u8> {
         verdicts::table(style, &endings);
     }
     if let Some(folder) = &arguments.report {
-        let scenes: Vec<_> = endings
-            .iter()
-            .map(|(name, ending)| ending.on_page(name))
-            .collect();
-        page::write(folder, &scenes)?;
+        let scenes = endings.iter().map(|(name, ending)| ending.on_page(name));
+        let page = Page {
+            title: "Étendue beside Mitsuba",
+            sides: ["Mitsuba", "Étendue"],
+            scenes: scenes.collect(),
+        };
+        page.write(folder)?;
     }
     Ok(if stop.signalled() {
         status::INTERRUPTED

@@ -1,11 +1,13 @@
 //! What crosschecks came to: a paragraph or a JSON object for each scene, a table of all, and the exit status.
 
 use etendue::budget::human_bytes;
+use etendue::compare::map::robust_top;
 use etendue::compare::seeds::{PlacesTest, Verdict};
-use etendue::crosscheck::{Cost, Crosscheck, Failure};
+use etendue::crosscheck::{Cost, Crosscheck, Failure, Pictures};
+use etendue::image::Encoding;
 use serde_json::{Value, json};
 
-use super::page::Scene;
+use super::page::{Pair, Scene};
 use super::{output, status};
 
 /// How much is told, and what counts as agreement.
@@ -83,7 +85,7 @@ impl Ending {
                 name,
                 status,
                 lines: vec![("why".to_owned(), failure.to_string())],
-                pictures: None,
+                pair: None,
             },
             Ok(crosscheck) => {
                 let lines = lines(crosscheck).into_iter();
@@ -93,7 +95,7 @@ impl Ending {
                     lines: lines
                         .map(|(label, text)| (label.to_owned(), text))
                         .collect(),
-                    pictures: crosscheck.pictures.as_ref(),
+                    pair: crosscheck.pictures.as_ref().map(pair),
                 }
             }
         }
@@ -102,6 +104,20 @@ impl Ending {
     /// Whether no other scene can fare better.
     pub(super) fn is_hopeless(&self) -> bool {
         matches!(self.result, Err(Failure::NoMitsuba(_) | Failure::Stopped))
+    }
+}
+
+/// Both sides' mean images.
+fn pair(pictures: &Pictures) -> Pair<'_> {
+    Pair {
+        reference: &pictures.reference,
+        other: &pictures.ours,
+        encoding: Encoding::Linear,
+        rgb: pictures.reference.rgb(),
+        distance: &pictures.standard_errors,
+        label: "standard errors apart",
+        top: robust_top(&pictures.standard_errors),
+        brighter: &pictures.brighter,
     }
 }
 
@@ -152,7 +168,7 @@ fn lines(crosscheck: &Crosscheck) -> Vec<(&'static str, String)> {
     } = crosscheck;
     let mut lines = Vec::new();
     if let Some(verdict) = &crosscheck.verdict {
-        lines.extend(judged(verdict));
+        lines.extend(judged(verdict, "Étendue"));
     }
     lines.push((
         "time",
@@ -195,7 +211,8 @@ fn takes(ratio: Option<f64>) -> String {
     }
 }
 
-fn judged(verdict: &Verdict) -> Vec<(&'static str, String)> {
+/// What is said of two sides; `other` names the second.
+pub(super) fn judged(verdict: &Verdict, other: &str) -> Vec<(&'static str, String)> {
     let mut lines = Vec::new();
     let biases = verdict.means.iter().map(|mean| {
         let half_width = 100.0 * mean.half_width;
@@ -204,7 +221,7 @@ fn judged(verdict: &Verdict) -> Vec<(&'static str, String)> {
         } else {
             "which is no chance"
         };
-        let words = mean.in_words("Étendue");
+        let words = mean.in_words(other);
         format!("{words} (± {half_width:.3} %, {trust})")
     });
     lines.push(("mean", biases.collect::<Vec<_>>().join(", ")));

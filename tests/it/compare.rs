@@ -566,3 +566,104 @@ fn a_signed_map_is_red_where_the_second_is_brighter_and_blue_where_it_is_darker(
     let same = top("a.exr a.exr", 0);
     assert!(same.iter().all(|v| *v > 0.9), "{same:?}");
 }
+
+#[test]
+fn a_page_shows_every_kind_of_comparison() {
+    let place = Place::new();
+    let names = |names: &[&str]| names.iter().map(ToString::to_string).collect();
+    for (name, scale) in [("n1", 1.0), ("n2", 1.1)] {
+        let data = (0..40 * 20 * 5)
+            .map(|i| scale * (i % 7) as f32 - 2.0)
+            .collect();
+        let channels = names(&["Y", "n.X", "n.Y", "n.Z", "d"]);
+        let image = Image::from_data(40, 20, channels, data).unwrap();
+        image::write(
+            &place.path(&format!("{name}.exr")),
+            &image,
+            &Metadata::default(),
+        )
+        .unwrap();
+    }
+    for (arguments, status, sides, label, says) in [
+        (
+            "a.exr b.exr",
+            1,
+            ["A", "B"],
+            "HDR-FLIP",
+            "B is 10.0 % brighter",
+        ),
+        (
+            "a.exr a.exr",
+            0,
+            ["A", "B"],
+            "HDR-FLIP",
+            "A and B are equal",
+        ),
+        ("a.png b.exr", 1, ["A", "B"], "FLIP", "A and B differ"),
+        (
+            "a.exr b.exr --map-of relative",
+            1,
+            ["A", "B"],
+            "relative |b - a|",
+            "differ",
+        ),
+        (
+            "n1.exr n2.exr --layer n",
+            1,
+            ["A", "B"],
+            "|b - a|",
+            "differ",
+        ),
+        (
+            "n1.exr n2.exr --layer d",
+            1,
+            ["A", "B"],
+            "|b - a|",
+            "differ",
+        ),
+        ("n1.exr n2.exr", 1, ["A", "B"], "HDR-FLIP", "differ"),
+        (
+            "--a s1.exr s2.exr --b t3.exr t4.exr --confidence 0.5",
+            1,
+            ["A", "B"],
+            "|t| between seeds",
+            "A and B differ",
+        ),
+        (
+            "b.exr --reference a.exr --variance a.exr --spp 64",
+            1,
+            ["reference", "image"],
+            "|z|",
+            "",
+        ),
+    ] {
+        place.says(&format!("{arguments} --report new/page -q"), status, "");
+        let page = fs::read_to_string(place.path("new/page/index.html")).unwrap();
+        let (_, data) = page.split_once("id=\"data\">").unwrap();
+        let (data, _) = data.split_once("</script>").unwrap();
+        let data: Value = serde_json::from_str(data).unwrap();
+        let scene = &data["scenes"][0];
+        assert_eq!(data["sides"], serde_json::json!(sides), "{arguments}");
+        assert_eq!(scene["status"], ["agree", "differ"][status as usize]);
+        assert_eq!(scene["pictures"]["error_label"], label, "{arguments}");
+        let lines: Vec<[String; 2]> = serde_json::from_value(scene["lines"].clone()).unwrap();
+        assert_eq!(lines[0][0], "verdict");
+        assert!(lines[0][1].contains(says), "{arguments}: {lines:?}");
+        assert!(lines.len() > 3, "{arguments}: {lines:?}");
+        // Nothing took any time, and nothing says so.
+        assert!(!lines.iter().any(|[label, _]| label == "time"), "{lines:?}");
+        let shown = scene["pictures"]["shown"].as_str().unwrap();
+        let false_colour = arguments.contains("--layer");
+        assert_eq!(shown.is_empty(), !false_colour, "{arguments}: {shown}");
+        fs::remove_dir_all(place.path("new")).unwrap();
+    }
+    // What cannot be compared makes no page, and what cannot be written is told before images are read.
+    place.says("a.exr n1.exr --report new/page", 2, "the sizes differ");
+    assert!(!place.path("new").exists());
+    place.says("a.exr b.exr --report a.exr", 2, "is not a folder");
+    place.says(
+        "a.exr b.exr --map-of flip",
+        2,
+        "--map-of says what a map shows",
+    );
+}

@@ -8,7 +8,8 @@ use etendue::compare::{Layer, pair};
 use etendue::error::{Error, Location, Result};
 use serde_json::Value;
 
-use super::{Arguments, Outcome, T_TOP, head};
+use super::super::verdicts::judged;
+use super::{Arguments, Difference, Outcome, T_TOP, head};
 
 pub(super) fn sides(arguments: &Arguments) -> Result<Outcome> {
     let budget = arguments.memory.budget();
@@ -27,22 +28,36 @@ pub(super) fn sides(arguments: &Arguments) -> Result<Outcome> {
             .help("take more samples or seeds"));
         }
     }
-    if arguments.map.is_some() {
-        let values = seeds::map(&a, &b)?;
-        arguments.draw(&layer, &values, "|t| between seeds", T_TOP)?;
-    }
-    if arguments.signed_map.is_some() {
-        arguments.draw_signed(&a.mean()?, &b.mean()?, layer.rgb)?;
-    }
+    let difference = match arguments.shows() {
+        true => Some(Difference {
+            images: [a.mean()?, b.mean()?],
+            sides: [("A", &arguments.a), ("B", &arguments.b)].map(|(side, paths)| {
+                let paths: Vec<String> = paths.iter().map(|p| p.display().to_string()).collect();
+                (side, paths.join(", "))
+            }),
+            encoding: layer.encoding,
+            rgb: layer.rgb,
+            distance: match arguments.shows_distance() {
+                true => seeds::map(&a, &b)?,
+                false => Vec::new(),
+            },
+            label: "|t| between seeds",
+            top: T_TOP,
+        }),
+        false => None,
+    };
     let mut lines = head(&layer, &[]);
     lines.extend(verdict_lines(&verdict));
     let mut object = serde_json::to_value(&verdict).expect("it has only names and numbers");
     object["a"] = names(&arguments.a);
     object["b"] = names(&arguments.b);
+    let rows = judged(&verdict, "B").into_iter();
     Ok(Outcome {
         agrees: verdict.agrees,
+        rows: rows.map(|(label, text)| (label.to_owned(), text)).collect(),
         sentence: verdict.sentence,
         lines,
+        difference,
         object,
     })
 }

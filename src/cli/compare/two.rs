@@ -4,14 +4,14 @@ use std::path::Path;
 
 use etendue::compare::map;
 use etendue::compare::metric::ChannelMeans;
-use etendue::compare::pair::{self, Report};
+use etendue::compare::pair::{self, Figure, Report};
 use etendue::compare::seeds;
 use etendue::compare::{Layer, flip};
 use etendue::error::{Error, Location, Result};
 use etendue::image::Encoding;
 use serde_json::json;
 
-use super::{Arguments, Limit, MapOf, Outcome, head};
+use super::{Arguments, Difference, Limit, MapOf, Outcome, head};
 
 pub(super) fn two(arguments: &Arguments, path_a: &Path, path_b: &Path) -> Result<Outcome> {
     let selection = arguments.selection();
@@ -30,10 +30,6 @@ pub(super) fn two(arguments: &Arguments, path_a: &Path, path_b: &Path) -> Result
     };
     let report = pair::measure(&a, &b, &options)?;
     let (agrees, sentence) = judge(arguments, &report)?;
-    if arguments.map.is_some() {
-        draw_pair(arguments, &a, &b)?;
-    }
-    arguments.draw_signed(&a.image, &b.image, a.rgb)?;
     let mut object = serde_json::to_value(&report).expect("it has only names and numbers");
     object["a"] = path_a.display().to_string().into();
     object["b"] = path_b.display().to_string().into();
@@ -41,11 +37,32 @@ pub(super) fn two(arguments: &Arguments, path_a: &Path, path_b: &Path) -> Result
     object["not_compared"] = json!({ "a": a.others, "b": b.others });
     let mut lines = head(&a, &[(path_a, "A"), (path_b, "B")]);
     lines.extend(table(&report));
+    let difference = match arguments.shows() {
+        true => {
+            let (distance, label, top) = match arguments.shows_distance() {
+                true => distance(arguments, &a, &b)?,
+                false => Default::default(),
+            };
+            Some(Difference {
+                encoding: a.encoding,
+                rgb: a.rgb,
+                images: [a.image, b.image],
+                sides: [("A", path_a), ("B", path_b)]
+                    .map(|(side, path)| (side, path.display().to_string())),
+                distance,
+                label,
+                top,
+            })
+        }
+        false => None,
+    };
     Ok(Outcome {
         agrees,
         sentence,
         lines,
+        rows: rows(&report),
         object,
+        difference,
     })
 }
 
@@ -62,23 +79,40 @@ fn table(report: &Report) -> Vec<String> {
     )];
     lines.extend(means);
     lines.push(String::new());
-    for figure in &report.metrics {
-        let value = match &figure.value {
-            Ok(value) if value.is_infinite() => "∞".to_owned(),
-            Ok(value) if *value == 0.0 || (1e-3..1e6).contains(&value.abs()) => {
-                format!("{value:.6}")
-            }
-            Ok(value) => format!("{value:.5e}"),
-            Err(why) => format!("none: {why}"),
-        };
-        let metric = figure.metric;
+    for Figure { metric, value } in &report.metrics {
         lines.push(format!(
-            "  {:10} {value:>12}   {}",
+            "  {:10} {:>12}   {}",
             metric.name(),
+            figure(value),
             metric.description()
         ));
     }
     lines
+}
+
+/// A metric's value, or why there is none.
+fn figure(value: &std::result::Result<f64, String>) -> String {
+    match value {
+        Ok(value) if value.is_infinite() => "∞".to_owned(),
+        Ok(value) if *value == 0.0 || (1e-3..1e6).contains(&value.abs()) => {
+            format!("{value:.6}")
+        }
+        Ok(value) => format!("{value:.5e}"),
+        Err(why) => format!("none: {why}"),
+    }
+}
+
+/// The same for a page.
+fn rows(report: &Report) -> Vec<(String, String)> {
+    let means = report.channels.iter().map(|c| {
+        let text = format!("{:.6} in A, {:.6} in B, {:+.4e}", c.a, c.b, c.bias);
+        (format!("mean {}", c.channel), text)
+    });
+    let metrics = report.metrics.iter().map(|Figure { metric, value }| {
+        let text = format!("{} ({})", figure(value), metric.description());
+        (metric.name().to_owned(), text)
+    });
+    means.chain(metrics).collect()
 }
 
 /// By how much B is brighter, over all channels.
@@ -143,7 +177,8 @@ fn judge(arguments: &Arguments, report: &Report) -> Result<(bool, String)> {
     })
 }
 
-fn draw_pair(arguments: &Arguments, a: &Layer, b: &Layer) -> Result<()> {
+/// How far apart pixels are, what that is, and where the scale ends.
+fn distance(arguments: &Arguments, a: &Layer, b: &Layer) -> Result<(Vec<f32>, &'static str, f32)> {
     let is_color = a.rgb.is_some();
     let of = arguments.map_of.unwrap_or(if is_color {
         MapOf::Flip
@@ -180,5 +215,5 @@ fn draw_pair(arguments: &Arguments, a: &Layer, b: &Layer) -> Result<()> {
     } else {
         map::robust_top(&values)
     };
-    arguments.draw(a, &values, label, top)
+    Ok((values, label, top))
 }
