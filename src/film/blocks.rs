@@ -206,6 +206,15 @@ impl Blocks {
         })
     }
 
+    /// Puts records in the place of what was there.
+    pub(crate) fn replace(&mut self, (records, tally): &<Self as Accumulator>::Part) {
+        let size = self.grid.record();
+        for record in records {
+            self.numbers[record.slot * size..][..size].copy_from_slice(&record.numbers);
+        }
+        self.tally.add(tally);
+    }
+
     /// The numbers of each half of each block.
     pub(crate) fn records(&self) -> impl Iterator<Item = &[f64]> {
         self.numbers.chunks_exact(self.grid.record())

@@ -13,7 +13,8 @@
 //! of a uniform budget, where the best takes e^(−s²/4)). So a block that needs `max_spp` samples to come to the
 //! threshold gets these, and others n ∝ v^⅔: no block is noisier than was asked, and quiet ones are less noisy.
 //!
-//! What follows the pilot is one set of the sampler's as large as is needed, from a ladder of sizes.
+//! What follows the pilot is one set of the sampler's as large as is needed, from a ladder of sizes. Before all pilots
+//! comes a draft, one sample of each pixel, so that there is soon a whole picture; the pilots replace it.
 
 use std::ops::Range;
 
@@ -192,74 +193,124 @@ pub(super) fn render<C: ColorModel>(
     let ladder = Ladder::checked(&job.view.sampler, options.1)?;
     let grid = Grid::new(&job.view.film, job.layout().count());
     let passes = ladder.passes() as usize - 1;
-    let pilots = grid.tiles();
+    let tiles = grid.tiles();
     let mut summed = Summed {
         sums: Blocks::new(grid)?,
         next: 0,
     };
     if let Some(keeper) = &mut keeper {
-        keeper.resume(&mut summed, pilots * (1 + passes))?;
+        keeper.resume(&mut summed, tiles * (2 + passes))?;
     }
-    progress.begin(Phase::Render, pilot_samples(&grid, &ladder, 0..pilots));
-    let done = pilots.min(summed.next);
-    progress.advance(pilot_samples(&grid, &ladder, 0..done), 0);
-    let first = summed.next;
-    let mut add = |part: Part| {
-        summed.sums.add(&part);
-        summed.next += 1;
-        if let Some(keeper) = &mut keeper {
-            keeper.keep_when_due(&summed);
-        }
-        show(job, options, &ladder, &summed.sums, progress)
+    let mut growing = Growing {
+        job,
+        options,
+        ladder: &ladder,
+        grid,
+        summed,
+        keeper,
+        progress,
     };
-    unit::run(first..pilots, progress, &mut add, |tile| {
-        pilot(job, &ladder, &grid, tile, progress)
+    // The draft's units, and those of the pilots.
+    let first = growing.summed.next;
+    let (drafted, piloted) = (first.min(tiles), first.clamp(tiles, 2 * tiles) - tiles);
+    let samples = |drafts: usize, pilots: usize| {
+        pixels(&grid, 0..drafts) + pilot_samples(&grid, &ladder, 0..pilots)
+    };
+    progress.begin(Phase::Render, samples(tiles, tiles));
+    progress.advance(samples(drafted, piloted), 0);
+    let take = |part| growing.take(&part);
+    unit::run(first..2 * tiles, progress, take, |unit| {
+        match unit.checked_sub(tiles) {
+            None => draft(job, &ladder, &grid, unit, progress),
+            Some(tile) => pilot(job, &ladder, &grid, tile, progress),
+        }
     })?;
-    if summed.next < pilots {
+    let next = growing.summed.next;
+    if next < 2 * tiles {
         let completed = Completed {
-            samples: 0,
+            samples: u32::from(next >= tiles),
             passes: [0, 1 + passes as u32],
-            units: [summed.next, pilots + 1],
+            units: [next, 2 * tiles + 1],
         };
-        return Ok((summed, completed, ladder));
+        return Ok((growing.summed, completed, ladder));
     }
 
-    let rest = Rest::new(&grid, &ladder, summed.sums.steps());
-    let units = pilots + rest.units();
-    if summed.next > units {
+    let rest = Rest::new(&grid, &ladder, growing.summed.sums.steps());
+    let units = 2 * tiles + rest.units();
+    if next > units {
         return Err(Error::input(
             "the checkpoint knows of more tiles than there are",
         ));
     }
-    let done = summed.next - pilots;
+    let done = next - 2 * tiles;
     progress.begin(Phase::Render, rest.samples(&grid, 0..rest.units()));
     progress.advance(rest.samples(&grid, 0..done), 0);
-    let add = |part: Part| {
-        summed.sums.add(&part);
-        summed.next += 1;
-        if let Some(keeper) = &mut keeper {
-            keeper.keep_when_due(&summed);
-        }
-        show(job, options, &ladder, &summed.sums, progress)
-    };
-    unit::run(pilots + done..units, progress, add, |unit| {
-        rest.render(job, &ladder, &grid, unit - pilots, progress)
+    let take = |part| growing.take(&part);
+    unit::run(next..units, progress, take, |unit| {
+        rest.render(job, &ladder, &grid, unit - 2 * tiles, progress)
     })?;
+    let next = growing.summed.next;
     let completed = Completed {
         samples: ladder.limits()[0],
-        passes: [1 + rest.pass(summed.next - pilots), 1 + rest.passes()],
-        units: [summed.next, units],
+        passes: [1 + rest.pass(next - 2 * tiles), 1 + rest.passes()],
+        units: [next, units],
     };
-    Ok((summed, completed, ladder))
+    Ok((growing.summed, completed, ladder))
+}
+
+/// The film while its units come in.
+struct Growing<'a, 'j, C: ColorModel> {
+    job: &'a Job<'j, C>,
+    options: (&'a Options, &'a Adaptive),
+    ladder: &'a Ladder,
+    grid: Grid,
+    summed: Summed<Blocks>,
+    keeper: Option<&'a mut Keeper>,
+    progress: &'a dyn Progress,
+}
+
+impl<C: ColorModel> Growing<'_, '_, C> {
+    fn take(&mut self, part: &Part) -> Result<()> {
+        let tiles = self.grid.tiles();
+        match (tiles..2 * tiles).contains(&self.summed.next) {
+            true => self.summed.sums.replace(part),
+            false => self.summed.sums.add(part),
+        }
+        self.summed.next += 1;
+        if let Some(keeper) = &mut self.keeper {
+            keeper.keep_when_due(&self.summed);
+        }
+        self.show()
+    }
+
+    /// Shows the image as it stands, where somebody wants to see it.
+    fn show(&self) -> Result<()> {
+        if !self.progress.wants_picture() {
+            return Ok(());
+        }
+        let (job, (options, adaptive)) = (self.job, self.options);
+        let (film, limits, blocks) = (&job.view.film, self.ladder.limits(), &self.summed.sums);
+        let image = develop(film, &job.layout(), blocks)?;
+        let report = Given::new(film, limits, blocks).report(adaptive.noise_threshold, limits);
+        let outcome = Outcome {
+            spp: report.mean_spp.round() as u32,
+            samples_complete: 0,
+            adaptive: Some(&report),
+        };
+        (self.progress).picture(&job.picture(&options.scene, image, &outcome));
+        Ok(())
+    }
+}
+
+/// How many pixels tiles have.
+fn pixels(grid: &Grid, tiles: Range<usize>) -> u64 {
+    let blocks = tiles.flat_map(|tile| grid.tile(tile));
+    blocks.map(|block| area(&grid.block(block))).sum()
 }
 
 /// How many samples the pilots of tiles take.
 pub(super) fn pilot_samples(grid: &Grid, ladder: &Ladder, tiles: Range<usize>) -> u64 {
-    let pixels: u64 = tiles
-        .flat_map(|tile| grid.tile(tile))
-        .map(|block| area(&grid.block(block)))
-        .sum();
-    pixels * u64::from(2 * ladder.begun())
+    pixels(grid, tiles) * u64::from(2 * ladder.begun())
 }
 
 fn area(window: &Window) -> u64 {
@@ -269,27 +320,23 @@ fn area(window: &Window) -> u64 {
 /// What a unit comes to.
 pub(super) type Part = (Vec<Record>, Tally);
 
-/// Shows the image as it stands, where somebody wants to see it.
-fn show<C: ColorModel>(
+/// The first sample of each pixel of a tile, which the pilot takes again, and counts.
+fn draft<C: ColorModel>(
     job: &Job<'_, C>,
-    (options, adaptive): (&Options, &Adaptive),
     ladder: &Ladder,
-    blocks: &Blocks,
+    grid: &Grid,
+    tile: usize,
     progress: &dyn Progress,
-) -> Result<()> {
-    if !progress.wants_picture() {
-        return Ok(());
-    }
-    let (film, limits) = (&job.view.film, ladder.limits());
-    let image = develop(film, &job.layout(), blocks)?;
-    let report = Given::new(film, limits, blocks).report(adaptive.noise_threshold, limits);
-    let outcome = Outcome {
-        spp: report.mean_spp.round() as u32,
-        samples_complete: 0,
-        adaptive: Some(&report),
-    };
-    progress.picture(&job.picture(&options.scene, image, &outcome));
-    Ok(())
+) -> Part {
+    let records = grid.tile(tile).map(|block| {
+        let mut sink = HalfBlock::new(job, grid, 2 * block);
+        let pixels = pixels_of(grid.block(block)).map(|pixel| (pixel, 0..1));
+        let stream = |pixel, index| stream(job.seed, 0, false, pixel, index);
+        samples::estimate(job, &ladder.pilot, pixels, stream, progress, &mut sink);
+        *sink.record.samples_mut() = 1.0;
+        sink.record
+    });
+    (records.collect(), Tally::default())
 }
 
 /// The pilots of a tile's blocks, and what they decide.

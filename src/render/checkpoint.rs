@@ -27,7 +27,7 @@ impl Checkpoint {
     }
 }
 
-const MARK: &[u8; 16] = b"etendue sums 4\r\n";
+const MARK: &[u8; 16] = b"etendue sums 5\r\n";
 /// Sums converted at a time.
 const CHUNK: usize = 1 << 13;
 
