@@ -25,6 +25,19 @@ pub(crate) struct Group {
 }
 
 impl Group {
+    /// The pixels of the window that the filter reaches.
+    #[inline(always)]
+    fn reached(&self, filter: &Filter, window: &Window) -> Window {
+        let [x, y] = self.pixel;
+        let center = Window {
+            x,
+            y,
+            width: 1,
+            height: 1,
+        };
+        center.grown(filter.reach(), window)
+    }
+
     /// Adds the samples to the sums over `window`, `stride` for each pixel, row by row, of which the first are the weight and
     /// the values. How many samples were left out, for they are not finite.
     ///
@@ -38,14 +51,18 @@ impl Group {
         stride: usize,
         sums: &mut [f64],
     ) -> u32 {
-        kernel.run(Splat {
+        let splat = Splat {
             group: self,
             filter,
             values,
             window,
             stride,
             sums,
-        })
+        };
+        match self.count {
+            1 => splat.single(),
+            _ => kernel.run(splat),
+        }
     }
 }
 
@@ -57,6 +74,50 @@ struct Splat<'a> {
     window: &'a Window,
     stride: usize,
     sums: &'a mut [f64],
+}
+
+impl Splat<'_> {
+    /// The same for a group of one sample, for which lanes would take as long as for a full one.
+    fn single(self) -> u32 {
+        let Self {
+            group,
+            filter,
+            values,
+            window,
+            stride,
+            sums,
+        } = self;
+        if !values.iter().all(|row| row[0].is_finite()) {
+            return 1;
+        }
+        let [x, y] = group.pixel;
+        let [right, below] = group.offsets.map(|row| row[0]);
+        let reached = group.reached(filter, window);
+        let [first_x, first_y] = [distance(reached.x, x), distance(reached.y, y)];
+        let mut columns = [0.0_f32; MAX_REACH];
+        let columns = &mut columns[..reached.width as usize];
+        for (i, column) in columns.iter_mut().enumerate() {
+            *column = filter.weight(first_x + i as f32 - right);
+        }
+        let start = (reached.y - window.y) as usize * window.width as usize;
+        let start = start + (reached.x - window.x) as usize;
+        for row in 0..reached.height as usize {
+            let down = filter.weight(first_y + row as f32 - below);
+            let pixels =
+                sums[(start + row * window.width as usize) * stride..].chunks_exact_mut(stride);
+            for (pixel, column) in pixels.zip(&*columns) {
+                let weight = column * down;
+                let [sum, sums @ ..] = pixel else {
+                    return 0;
+                };
+                *sum += f64::from(weight);
+                for (sum, value) in sums.iter_mut().zip(values) {
+                    *sum += f64::from(value[0] * weight);
+                }
+            }
+        }
+        0
+    }
 }
 
 /// A number for each sample: as many lanes as that takes.
@@ -92,13 +153,7 @@ impl Task for Splat<'_> {
         } = self;
         let (accepted, refused) = accepted::<F>(group.count, values);
         let [x, y] = group.pixel;
-        let center = Window {
-            x,
-            y,
-            width: 1,
-            height: 1,
-        };
-        let reached = center.grown(filter.reach(), window);
+        let reached = group.reached(filter, window);
         let columns = weights::<F>(filter, &group.offsets[0], reached.x, x, reached.width);
         let rows = weights::<F>(filter, &group.offsets[1], reached.y, y, reached.height);
         let left = (reached.x - window.x) as usize;
@@ -147,6 +202,13 @@ fn accepted<F: Lanes>(count: usize, values: &[[f32; GROUP]]) -> ([F::Mask; GROUP
     (accepted, refused)
 }
 
+/// From the near edge of the samples' own pixel to the middle of another: relative, so that it does not depend on where on
+/// the film they are.
+#[inline(always)]
+fn distance(to: u32, own: u32) -> f32 {
+    (f64::from(to) - f64::from(own)) as f32 + 0.5
+}
+
 /// The filter's weights along an axis, for `count` pixels from `first` on and the samples of pixel `own`.
 #[inline(always)]
 fn weights<F: Lanes>(
@@ -157,8 +219,7 @@ fn weights<F: Lanes>(
     count: u32,
 ) -> [[f32; GROUP]; MAX_REACH] {
     let mut weights = [[0.0; GROUP]; MAX_REACH];
-    // Relative to the samples' own pixel, so that they do not depend on where on the film it is.
-    let first = (f64::from(first) - f64::from(own)) as f32 + 0.5;
+    let first = distance(first, own);
     for (i, row) in weights.iter_mut().take(count as usize).enumerate() {
         let offsets = load::<F>(offsets);
         for part in 0..parts::<F>() {
@@ -187,7 +248,7 @@ mod tests {
             height: 8,
         };
         let filter = Filter::default();
-        for (count, pixel) in [(16, [7, 8]), (5, [3, 12]), (1, [11, 5])] {
+        for (count, pixel) in [(16, [7, 8]), (5, [3, 12]), (1, [11, 5]), (1, [6, 9])] {
             let number = |key, i: usize| random::unit(random::bits(key, i as u32));
             let offsets: Vec<Vec2> = (0..count)
                 .map(|i| Vec2::new(number(1, i), number(2, i)))
@@ -230,6 +291,17 @@ mod tests {
                 }
                 let first = first.get_or_insert_with(|| sums.clone());
                 assert!(sums == *first, "{}", kernel.name());
+                let mut lanes = vec![0.0; expected.len()];
+                let splat = Splat {
+                    group: &group,
+                    filter: &filter,
+                    values: &values,
+                    window: &window,
+                    stride: 6,
+                    sums: &mut lanes,
+                };
+                assert_eq!(kernel.run(splat), refused);
+                assert!(lanes == sums, "one sample by itself: {}", kernel.name());
             }
         }
     }
