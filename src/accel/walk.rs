@@ -358,6 +358,19 @@ impl<'t, L: Ledger + ?Sized, const ANY: bool> Walker<'t> for Party<'_, 't, '_, L
     }
 
     #[inline(always)]
+    fn fetch(&self, instance: u32, item: u32) {
+        let tracer = self.walk.tracer;
+        let group = match instance == self.way.instance {
+            true => self.way.group,
+            false => tracer.instances[instance as usize].group,
+        };
+        let item = &tracer.groups[group as usize].items()[item as usize];
+        if item.as_instance().is_none() {
+            tracer.shapes.get(item.shape).fetch(item.index);
+        }
+    }
+
+    #[inline(always)]
     fn other(&mut self, visit: &Visit, item: u32) -> Met<'t> {
         let tracer = self.walk.tracer;
         let way = if visit.instance == self.way.instance {

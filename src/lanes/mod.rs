@@ -42,6 +42,15 @@ pub const MAX_LANES: usize = 16;
 /// No table from which lanes gather has more entries.
 pub const MAX_TABLE: usize = 1 << 31;
 
+/// Asks for a value's memory ahead, as far as it lies where the value begins.
+#[inline(always)]
+pub fn fetch<T>(value: &T) {
+    #[cfg(target_arch = "x86_64")]
+    x86::fetch(value);
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = value;
+}
+
 /// The index of a table's last entry.
 #[inline(always)]
 fn last_of<T>(table: &[T]) -> u32 {

@@ -8,9 +8,9 @@
 
 use std::f64::consts::TAU;
 
-use glam::{DMat4, DVec3, DVec4, Vec2, Vec3};
+use glam::{DMat4, DVec3, DVec4, Vec2, Vec3, Vec4};
 
-use super::curves::{Basis, Curves, OnTube, around_balls, read, turned};
+use super::curves::{Basis, Curves, OnTube, around_balls, passes_by, read, turned};
 use super::{Bounds, Geometry, Shape, Surface, SurfaceSample, area_to_solid_angle};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, file};
@@ -58,6 +58,19 @@ fn bezier([p0, p1, p2, p3]: [DVec4; 4]) -> [DVec4; 4] {
         (2.0 * p1 + p2) / 3.0,
         (p1 + 2.0 * p2) / 3.0,
         (p1 + 4.0 * p2 + p3) / 6.0,
+    ]
+}
+
+/// The same in single precision.
+#[inline]
+fn bezier_single([p0, p1, p2, p3]: [Vec4; 4]) -> [Vec4; 4] {
+    const THIRD: f32 = 1.0 / 3.0;
+    let (one, two) = (THIRD * (2.0 * p1 + p2), THIRD * (p1 + 2.0 * p2));
+    [
+        0.5 * (THIRD * (p0 + 2.0 * p1) + one),
+        one,
+        two,
+        0.5 * (two + THIRD * (2.0 * p2 + p3)),
     ]
 }
 
@@ -226,6 +239,10 @@ fn approach(points: &[DVec4; 4], mut u: f64) -> Option<Crossing> {
 impl BsplineCurves {
     /// Where a ray first meets a segment.
     fn first(&self, segment: u32, ray: &Ray) -> Option<Crossing> {
+        let balls = bezier_single(self.curves.seen(segment, ray.origin));
+        if passes_by(&balls, ray.direction) {
+            return None;
+        }
         let origin = ray.origin.as_dvec3();
         let direction = ray.direction.as_dvec3();
         let length = direction.length();
@@ -404,6 +421,10 @@ impl Surface for BsplineCurves {
         let way = ray.origin.as_dvec3() + f64::from(hit.t) * ray.direction.as_dvec3();
         let on_tube = self.toward(self.curves.segment_of(hit), hit.u, way);
         self.curves.interaction(ray, hit, &on_tube)
+    }
+
+    fn fetch(&self, primitive: u32) {
+        self.curves.fetch(primitive);
     }
 
     fn area(&self) -> f64 {

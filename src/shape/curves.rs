@@ -1,6 +1,6 @@
 //! Curves as tubes of varying radius, from a text file: a control point a line, `x y z radius`, and an empty line
-//! before each further curve. [`Curves`] holds the points of all curves and where each segment begins: 16 bytes a point
-//! and 4 a segment, for hair has millions. What a segment looks like is each plugin's own.
+//! before each further curve. [`Curves`] holds the points of all curves, 16 bytes each, and a bit for each segment that
+//! begins a curve: hair has millions. What a segment looks like is each plugin's own.
 
 mod read;
 
@@ -10,6 +10,7 @@ use glam::{DVec3, DVec4, Vec2, Vec3, Vec4};
 
 use super::{Bounds, SurfaceSample};
 use crate::interaction::{Hit, Interaction, Ray, offset};
+use crate::lanes;
 use crate::math::Frame;
 use crate::math::distribution::Discrete;
 
@@ -29,11 +30,27 @@ pub(super) struct Basis {
 pub(super) struct Curves {
     /// World space, with the radius in scene units.
     points: Vec<Vec4>,
-    /// The first control point of each segment.
-    segments: Vec<u32>,
+    /// How many segments there are.
+    count: u32,
+    /// How many points a curve has more than segments.
+    more: u32,
+    /// Which segments begin a curve, 64 at a time.
+    begun: Vec<Begun>,
     /// Over segments, by area; made when light is first drawn.
     areas: OnceLock<Option<Discrete>>,
 }
+
+/// Of 64 segments, those that begin a curve.
+#[derive(Clone, Copy, Debug)]
+struct Begun {
+    /// The lowest bit is the first segment's.
+    bits: u64,
+    /// How many segments before these begin one.
+    before: u32,
+}
+
+/// Segments of a [`Begun`].
+const BEGUN: u32 = u64::BITS;
 
 /// A place on a tube.
 pub(super) struct OnTube {
@@ -71,22 +88,77 @@ impl OnTube {
 }
 
 impl Curves {
+    /// None yet.
+    fn new(basis: Basis) -> Self {
+        Self {
+            points: Vec::new(),
+            count: 0,
+            more: basis.points as u32 - 1,
+            begun: Vec::new(),
+            areas: OnceLock::new(),
+        }
+    }
+
+    /// Makes a curve of so many segments, one at least, of the points that no curve has yet.
+    fn begin(&mut self, segments: u32) {
+        let before = self.begun.last();
+        let before = before.map_or(0, |last| last.before + last.bits.count_ones());
+        let first = self.count;
+        self.count += segments;
+        let all = self.count.div_ceil(BEGUN) as usize;
+        while self.begun.len() < all {
+            let own = self.begun.len() as u32 * BEGUN > first;
+            let before = before + u32::from(own);
+            self.begun.push(Begun { bits: 0, before });
+        }
+        self.begun[(first / BEGUN) as usize].bits |= 1 << (first % BEGUN);
+    }
+
     pub(super) fn count(&self) -> u32 {
-        self.segments.len() as u32
+        self.count
+    }
+
+    /// The first control point of a segment.
+    #[inline]
+    fn first(&self, segment: u32) -> usize {
+        let begun = self.begun[(segment / BEGUN) as usize];
+        let upto = begun.bits << (BEGUN - 1 - segment % BEGUN);
+        let curve = begun.before + upto.count_ones() - 1;
+        segment as usize + self.more as usize * curve as usize
+    }
+
+    /// The control points of a segment, which are `N`, with their radii.
+    #[inline]
+    fn balls<const N: usize>(&self, segment: u32) -> &[Vec4; N] {
+        let balls = self.points[self.first(segment)..].first_chunk();
+        balls.expect("a segment has as many points as its basis")
     }
 
     /// The control points of a segment, which are `N`.
     #[inline]
     pub(super) fn segment<const N: usize>(&self, segment: u32) -> [DVec4; N] {
-        let first = self.segments[segment as usize] as usize;
-        std::array::from_fn(|i| self.points[first + i].as_dvec4())
+        self.balls(segment).map(|ball| ball.as_dvec4())
+    }
+
+    /// The same, as they are seen from a place.
+    #[inline]
+    pub(super) fn seen<const N: usize>(&self, segment: u32, from: Vec3) -> [Vec4; N] {
+        self.balls(segment).map(|ball| ball - from.extend(0.0))
+    }
+
+    /// Asks for the memory of a segment's points ahead.
+    #[inline]
+    pub(super) fn fetch(&self, segment: u32) {
+        let first = self.first(segment);
+        lanes::fetch(&self.points[first]);
+        lanes::fetch(&self.points[first + self.more as usize]);
     }
 
     /// Whether the segment before is of the same curve.
     #[inline]
     pub(super) fn follows(&self, segment: u32) -> bool {
-        let before = segment.checked_sub(1).map(|s| self.segments[s as usize]);
-        before.is_some_and(|before| before + 1 == self.segments[segment as usize])
+        let begun = self.begun[(segment / BEGUN) as usize];
+        begun.bits >> (segment % BEGUN) & 1 == 0
     }
 
     /// Segments in proportion to their area, which `area` tells; `None` where there is none.
@@ -137,7 +209,7 @@ impl Curves {
     }
 
     pub(super) fn bytes(&self) -> usize {
-        self.points.len() * size_of::<Vec4>() + self.segments.len() * size_of::<u32>()
+        size_of_val(&*self.points) + size_of_val(&*self.begun)
     }
 }
 
@@ -165,6 +237,29 @@ fn rounding(at: &OnTube) -> Vec3 {
     (reach * (f64::from(offset::gamma(2)) + DOUBLE)).as_vec3()
 }
 
+/// How far a line may seem to pass by and still meet: some rounding of single precision.
+const ROUNDING: f32 = 64.0 * f32::EPSILON;
+
+/// Whether a line from the origin passes by the hull of balls, which a plane through it tells that goes along them.
+/// Most segments whose boxes a ray enters it passes by. Says no where it is not sure.
+#[inline]
+pub(super) fn passes_by<const N: usize>(balls: &[Vec4; N], direction: Vec3) -> bool {
+    let chord = (balls[N - 1] - balls[0]).truncate();
+    let normal = direction.cross(chord);
+    let length = normal.length();
+    let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
+    let mut reach = 0.0_f32;
+    for ball in balls {
+        let height = ball.truncate().dot(normal);
+        low = low.min(height - ball.w * length);
+        high = high.max(height + ball.w * length);
+        reach = reach.max(ball.length_squared());
+    }
+    let room = ROUNDING * (reach * direction.length_squared() * chord.length_squared()).sqrt();
+    // Where these numbers are of no common size, products of them may not be what they should.
+    (1e-15..1e15).contains(&room) && (low > room || high < -room)
+}
+
 /// A box around balls, with room for rounding: around all that lies in their convex hull.
 pub(super) fn around_balls(balls: &[DVec4]) -> Bounds {
     let bounds = balls.iter().fold(Bounds::EMPTY, |bounds, ball| {
@@ -175,5 +270,43 @@ pub(super) fn around_balls(balls: &[DVec4]) -> Bounds {
     Bounds {
         min: bounds.min - room,
         max: bounds.max + room,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::random;
+
+    /// No line through the hull of balls passes them by, near or far, thick or thin; of lines beside them most do.
+    #[test]
+    fn a_line_that_meets_passes_nothing_by() {
+        let (mut lines, mut passed) = (0, 0);
+        for i in 0..200_000 {
+            let number = |key: u64| random::unit(random::bits(key, i));
+            let vector =
+                |key| Vec3::from_array([key, key + 1, key + 2].map(|key| 2.0 * number(key) - 1.0));
+            let size = 10_f32.powf(4.0 * number(0) - 2.0);
+            let radius = size * 10_f32.powf(-4.0 * number(1));
+            let distance = size * 10_f32.powf(3.0 * number(2));
+            let middle = distance * vector(3).normalize();
+            let balls: [Vec4; 4] = std::array::from_fn(|ball| {
+                let key = 10 + 4 * ball as u64;
+                let center = middle + size * vector(key);
+                center.extend(radius * number(key + 3))
+            });
+            let shares: [f32; 4] = std::array::from_fn(|ball| number(40 + ball as u64));
+            let all: f32 = shares.iter().sum();
+            let inside: DVec4 = (balls.iter().zip(shares))
+                .map(|(ball, share)| f64::from(share / all) * ball.as_dvec4())
+                .sum();
+            let out = vector(50).as_dvec3().normalize();
+            let at = inside.truncate() + inside.w * 0.999 * out;
+            assert!(!passes_by(&balls, at.normalize().as_vec3()), "{balls:?}");
+            let beside = middle + 3.0 * size * vector(60);
+            lines += 1;
+            passed += i32::from(passes_by(&balls, beside.normalize()));
+        }
+        assert!(2 * passed > lines, "{passed} of {lines}");
     }
 }

@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 
 use glam::{DMat4, DVec3, DVec4, Vec2, Vec3};
 
-use super::curves::{Basis, Curves, OnTube, around_balls, read, turned};
+use super::curves::{Basis, Curves, OnTube, around_balls, passes_by, read, turned};
 use super::{Bounds, Geometry, Shape, Surface, SurfaceSample, area_to_solid_angle};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, file};
@@ -139,6 +139,9 @@ impl LinearCurves {
 
     /// Where a ray first meets a segment: t, and the place on it.
     fn first(&self, segment: u32, ray: &Ray) -> Option<(f64, f64)> {
+        if passes_by(&self.curves.seen::<2>(segment, ray.origin), ray.direction) {
+            return None;
+        }
         let [a, b] = self.curves.segment(segment);
         let cone = Cone::new([a, b]);
         let direction = ray.direction.as_dvec3();
@@ -264,6 +267,10 @@ impl Surface for LinearCurves {
         let place = ray.origin.as_dvec3() + f64::from(hit.t) * ray.direction.as_dvec3();
         let on_tube = self.toward(self.curves.segment_of(hit), hit.u, place);
         self.curves.interaction(ray, hit, &on_tube)
+    }
+
+    fn fetch(&self, primitive: u32) {
+        self.curves.fetch(primitive);
     }
 
     fn area(&self) -> f64 {

@@ -113,6 +113,8 @@ pub trait Surface: std::fmt::Debug + Send + Sync {
     fn bounds(&self, primitive: u32) -> Bounds;
     /// (t, u, v) of a primitive's first hit with 0 < t ≤ `t_max`.
     fn intersect(&self, primitive: u32, ray: &Ray) -> Option<(f32, f32, f32)>;
+    /// Asks for the memory ahead that [`Surface::intersect`] will read.
+    fn fetch(&self, _primitive: u32) {}
     /// What a hit looks like; `hit` came from this surface and `ray`.
     fn interaction(&self, ray: &Ray, hit: &Hit) -> Interaction<'_>;
     /// In square units of the scene; infinite where no light may come from it, as is said of one that does not say it.

@@ -31,7 +31,7 @@ struct Lists {
     nodes: [List; 2],
     leaves: [List; 2],
     inside: List,
-    rest: List,
+    rest: [List; 2],
     /// What those of a list that was just taken in hand visit next.
     currents: List,
 }
@@ -144,54 +144,51 @@ impl Stacks {
         better
     }
 
-    /// Deals with a ray at items that are no triangles, or at an instance's end, until it is at a node or a block,
-    /// or done.
+    /// Deals with a ray at an item that is no triangle, or at an instance's end.
     ///
     /// # Safety
     /// As [`Stacks::step`]; above the top is room for an entry and for what the walker's inner trees leave.
     #[inline(always)]
-    unsafe fn others<'t, L: Lanes, W: Walker<'t>, const ANY: bool, const LATER: bool>(
+    unsafe fn other<'t, L: Lanes, W: Walker<'t>, const ANY: bool, const LATER: bool>(
         self,
         ray: &mut State,
         tree: &'t Tree,
         walker: &mut W,
     ) {
-        while ray.current >= OTHER && ray.current != DONE {
-            if ray.current == LEAVE {
-                found::<W, ANY, LATER>(walker, ray);
-                let start = walker.start(ray.ray as usize);
-                // SAFETY: the caller has what `L` needs.
-                unsafe { enter::<L, LATER>(ray, tree, &start) };
-            } else {
-                // SAFETY: what the ray is at was taken from its top.
-                let entry = unsafe { *self.start.add(ray.top as usize) };
-                let reached = f32::from_bits((entry >> 32) as u32);
-                match walker.other(&ray.visit(reached), ray.current & OTHER_INDEX) {
-                    Met::Nothing => {}
-                    Met::Better(Best { t, id, place }) => {
-                        ray.reach(t);
-                        (ray.id, ray.place) = (id, place.0);
-                        if ANY {
-                            ray.current = DONE;
-                            return;
-                        }
-                    }
-                    Met::Instance(inner, start) => {
-                        assert!(inner.levels <= self.inner_levels, "room for the tree");
-                        found::<W, ANY, LATER>(walker, ray);
-                        // SAFETY: there is room, and the caller has what `L` needs.
-                        unsafe {
-                            *self.start.add(ray.top as usize) = EXIT;
-                            ray.top += 1;
-                            enter::<L, LATER>(ray, inner, &start);
-                        }
+        if ray.current == LEAVE {
+            found::<W, ANY, LATER>(walker, ray);
+            let start = walker.start(ray.ray as usize);
+            // SAFETY: the caller has what `L` needs.
+            unsafe { enter::<L, LATER>(ray, tree, &start) };
+        } else {
+            // SAFETY: what the ray is at was taken from its top.
+            let entry = unsafe { *self.start.add(ray.top as usize) };
+            let reached = f32::from_bits((entry >> 32) as u32);
+            match walker.other(&ray.visit(reached), ray.current & OTHER_INDEX) {
+                Met::Nothing => {}
+                Met::Better(Best { t, id, place }) => {
+                    ray.reach(t);
+                    (ray.id, ray.place) = (id, place.0);
+                    if ANY {
+                        ray.current = DONE;
                         return;
                     }
                 }
+                Met::Instance(inner, start) => {
+                    assert!(inner.levels <= self.inner_levels, "room for the tree");
+                    found::<W, ANY, LATER>(walker, ray);
+                    // SAFETY: there is room, and the caller has what `L` needs.
+                    unsafe {
+                        *self.start.add(ray.top as usize) = EXIT;
+                        ray.top += 1;
+                        enter::<L, LATER>(ray, inner, &start);
+                    }
+                    return;
+                }
             }
-            // SAFETY: as for `step`.
-            (ray.top, ray.current) = unsafe { self.next::<L, ANY>(ray) };
         }
+        // SAFETY: as for `step`.
+        (ray.top, ray.current) = unsafe { self.next::<L, ANY>(ray) };
     }
 
     /// Asks for what the ray will need in the next round.
@@ -311,7 +308,7 @@ pub(super) unsafe fn batch<
         nodes: [NONE; 2],
         leaves: [NONE; 2],
         inside: NONE,
-        rest: NONE,
+        rest: [NONE; 2],
         currents: NONE,
     };
     let bottoms: [u32; IN_FLIGHT] = std::array::from_fn(|slot| flight.bottom(slot));
@@ -321,7 +318,7 @@ pub(super) unsafe fn batch<
         unsafe { begin::<L, W, LATER>(walker, slot, state, tree, bottoms[slot]) };
         lists.nodes[0][slot] = slot as u32;
     }
-    let (mut next, mut node_count, mut leaf_count) = (slots, slots, 0);
+    let (mut next, mut node_count, mut leaf_count, mut rest_count) = (slots, slots, 0, 0);
     let (mut node_steps, mut triangle_tests) = (0, 0);
     // SAFETY: every slot is on one list at a time, so none outgrows its array; rays at a node, a block or
     // an item are at one of this tree; stacks have room for its levels.
@@ -330,10 +327,11 @@ pub(super) unsafe fn batch<
         let leaf_lists = lists.leaves.as_mut_ptr();
         let (mut nodes, mut later_nodes) = (node_lists.cast::<u32>(), node_lists.add(1).cast());
         let (mut leaves, mut later_leaves) = (leaf_lists.cast::<u32>(), leaf_lists.add(1).cast());
-        let rest = lists.rest.as_mut_ptr();
+        let rest_lists = lists.rest.as_mut_ptr();
+        let (mut rest, mut later_rest) = (rest_lists.cast::<u32>(), rest_lists.add(1).cast());
         let inside = lists.inside.as_mut_ptr();
         let currents = lists.currents.as_mut_ptr();
-        while node_count + leaf_count > 0 {
+        while node_count + leaf_count + rest_count > 0 {
             node_steps += node_count as u64;
             for i in 0..node_count {
                 let ray = &mut *states.add(*nodes.add(i) as usize);
@@ -346,7 +344,7 @@ pub(super) unsafe fn batch<
             let mut ends = Ends {
                 nodes: later_nodes,
                 leaves: leaves.add(leaf_count),
-                rest,
+                rest: rest.add(rest_count),
             };
             L::file(nodes, currents, node_count, &mut ends);
             leaf_count = ends.leaves.offset_from(leaves) as usize;
@@ -378,12 +376,22 @@ pub(super) unsafe fn batch<
             }
             ends.leaves = later_leaves;
             L::file(leaves, currents, leaf_count, &mut ends);
-            let rest_count = ends.rest.offset_from(rest) as usize;
+            rest_count = ends.rest.offset_from(rest) as usize;
+            if FETCH {
+                for i in 0..rest_count {
+                    let ray = &*states.add(*rest.add(i) as usize);
+                    if ray.current < LEAVE {
+                        walker.fetch(ray.instance, ray.current & OTHER_INDEX);
+                    }
+                }
+            }
             let mut ready = 0;
             for i in 0..rest_count {
                 let slot = *rest.add(i);
                 let ray = &mut *states.add(slot as usize);
-                stacks.others::<L, W, ANY, LATER>(ray, tree, walker);
+                if ray.current != DONE {
+                    stacks.other::<L, W, ANY, LATER>(ray, tree, walker);
+                }
                 if ray.current == DONE {
                     found::<W, ANY, LATER>(walker, ray);
                     if next == count {
@@ -398,14 +406,16 @@ pub(super) unsafe fn batch<
             }
             // Written behind the others, which have been read.
             let mut again = Ends {
-                rest: inside,
+                rest: later_rest,
                 ..ends
             };
             L::file(rest, currents, ready, &mut again);
             node_count = again.nodes.offset_from(later_nodes) as usize;
             leaf_count = again.leaves.offset_from(later_leaves) as usize;
+            rest_count = again.rest.offset_from(later_rest) as usize;
             (nodes, later_nodes) = (later_nodes, nodes);
             (leaves, later_leaves) = (later_leaves, leaves);
+            (rest, later_rest) = (later_rest, rest);
         }
     }
     counts.node_steps += node_steps;

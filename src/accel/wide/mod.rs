@@ -49,6 +49,9 @@ pub(super) use state::{Best, Place, Start, Visit};
 pub(super) trait Walker<'t> {
     /// The ray with this index, and the best that is known of it.
     fn start(&self, ray: usize) -> Start;
+    /// Asks for the memory ahead of an item that is no triangle, which will be met; of the tree of that instance, or of
+    /// the one in which the walk began.
+    fn fetch(&self, instance: u32, item: u32);
     /// Meets one of the items that are no triangles, of the tree that the ray is in.
     fn other(&mut self, visit: &Visit, item: u32) -> Met<'t>;
     /// A triangle, of the world's tree or in an instance, is the best so far; with its u and v.

@@ -33,6 +33,13 @@ macro_rules! operators {
 }
 use operators;
 
+/// See [`super::fetch`].
+#[inline(always)]
+pub(super) fn fetch<T>(value: &T) {
+    // SAFETY: every processor of x86-64 has the instruction, which reads nothing.
+    unsafe { _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(value).cast()) };
+}
+
 /// The sum of eight numbers, by halves.
 ///
 /// # Safety

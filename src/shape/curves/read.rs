@@ -60,8 +60,7 @@ impl Reader<'_> {
             let error = Error::input(message).at(&Location::of_line(self.path, line));
             return Err(error.help("an empty line ends a curve"));
         }
-        let starts = (first..=first + points - needed).map(|point| point as u32);
-        self.curves.segments.extend(starts);
+        self.curves.begin((points - needed + 1) as u32);
         Ok(())
     }
 }
@@ -70,11 +69,7 @@ fn parse(text: &[u8], path: &Path, to_world: &DMat4, basis: Basis) -> Result<Tex
     let mut reader = Reader {
         path,
         basis,
-        curves: Curves {
-            points: Vec::new(),
-            segments: Vec::new(),
-            areas: Default::default(),
-        },
+        curves: Curves::new(basis),
         curve: None,
     };
     let (mut longer, mut first_longer) = (0_usize, 0);
@@ -118,7 +113,7 @@ fn parse(text: &[u8], path: &Path, to_world: &DMat4, basis: Basis) -> Result<Tex
         return Err(error.help("a line of it is \"x y z radius\""));
     }
     curves.points.shrink_to_fit();
-    curves.segments.shrink_to_fit();
+    curves.begun.shrink_to_fit();
     let mut warnings = Vec::new();
     if longer > 0 {
         let message = format!("what follows the fourth number is left out; lines: {longer}");
@@ -181,7 +176,7 @@ mod tests {
     fn empty_lines_part_curves_and_each_has_its_segments() {
         let text = "\n0 0 0 .1\r\n1\t0 0 1e-1 7\n2 0 0 0.1\n  \n\n3 0 0 .2\n4 0 0 .3 and more";
         let Text { curves, warnings } = parsed(text).unwrap();
-        assert_eq!(curves.segments, [0, 1, 3]);
+        assert_eq!([0, 1, 2].map(|segment| curves.first(segment)), [0, 1, 3]);
         assert_eq!(curves.points[4], Vec4::new(4.0, 0.0, 0.0, 0.3));
         assert!([0, 2].into_iter().all(|segment| !curves.follows(segment)));
         assert!(curves.follows(1));
@@ -190,6 +185,29 @@ mod tests {
             said.starts_with("a.txt:3: ") && said.ends_with("lines: 2"),
             "{said}"
         );
+    }
+
+    /// Curves of one segment and of many, over more than one group of them.
+    #[test]
+    fn segments_know_their_points() {
+        for basis in [2, 4] {
+            let mut curves = Curves::new(Basis {
+                points: basis,
+                name: "a curve",
+            });
+            let mut firsts = Vec::new();
+            let mut points = 0;
+            for segments in [1, 63, 64, 1, 200, 2, 1, 1, 130, 1] {
+                curves.begin(segments as u32);
+                firsts.extend((points..points + segments).map(|first| (first, first > points)));
+                points += segments + basis - 1;
+            }
+            assert_eq!(curves.count() as usize, firsts.len());
+            for (segment, (first, follows)) in firsts.into_iter().enumerate() {
+                assert_eq!(curves.first(segment as u32), first, "{segment}");
+                assert_eq!(curves.follows(segment as u32), follows, "{segment}");
+            }
+        }
     }
 
     #[test]
