@@ -7,6 +7,7 @@ use glam::{DMat3, DMat4, DVec3, Vec3};
 use super::surface_tests::{skew, surface, uniform};
 use super::tests::{agree, all, direction};
 use super::*;
+use crate::math::Transform;
 use crate::mesh::{self, Mesh};
 use crate::shape::TriangleMesh;
 
@@ -263,4 +264,26 @@ fn an_instance_s_box_holds_it_and_is_closer_than_its_group_s_box_turned() {
         loose += area(tracer.groups[1].bounds().transformed(&to_world));
     }
     assert!(close < 0.8 * loose, "{close} of {loose}");
+}
+
+/// In an instance's own space the ray begins at infinity: it meets nothing there, and what is behind.
+#[test]
+fn a_ray_that_is_lost_in_an_instance_goes_on_outside() {
+    let small = instance(1, &DMat4::from_scale(DVec3::splat(1e-36)));
+    let mut wall = mesh::bumpy_sphere(1, 3);
+    wall.transform(&DMat4::from_translation(DVec3::new(50.0, 0.0, 0.0)));
+    let shapes = [geometry(smooth(2)), geometry(wall)];
+    let ray = Ray {
+        origin: Vec3::new(-1e3, 0.0, 0.0),
+        direction: Vec3::X,
+        t_max: f32::INFINITY,
+        time: 0.0,
+    };
+    let tracers = all(&shapes, &[1, 0], &[small]);
+    for tracer in &tracers {
+        let [hit] = closest(tracer, &[ray])[..] else {
+            unreachable!("one ray");
+        };
+        assert_eq!((hit.instance, hit.shape), (Hit::NONE, 1), "{hit:?}");
+    }
 }

@@ -15,13 +15,13 @@ mod wide;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use glam::{Vec2, Vec3};
+use glam::{Affine3, Vec2, Vec3};
 use rayon::prelude::*;
 
 use crate::error::{Error, Problem};
 use crate::interaction::{Hit, Interaction, Ray};
 use crate::lanes::Kernel;
-use crate::math::{Moving, Transform};
+use crate::math::Moving;
 use crate::shape::{Bounds, Geometry};
 
 use group::{Group, Members, Shapes};
@@ -300,7 +300,7 @@ impl Tracer {
         }
         let to_world = self.instances[hit.instance as usize].to_world.at(ray.time);
         shape
-            .interaction(&local(&to_world, ray), hit)
+            .interaction(&local(to_world.back(), ray), hit)
             .transformed(&to_world, ray.direction)
     }
 
@@ -385,22 +385,18 @@ impl Tracer {
 /// costs a tenth.
 const CACHED: usize = 16 << 20;
 
-/// The ray in an instance's space, as it stands at the ray's time.
+/// The ray in an instance's space, as it stands at the ray's time; t keeps its meaning, since the direction is not
+/// normalised.
 #[inline]
 fn to_local(to_world: &Moving, ray: &Ray) -> Ray {
-    match to_world {
-        Moving::Still(to_world) => local(to_world, ray),
-        Moving::Keyed(chain) => local(&chain.at(ray.time), ray),
-    }
+    local(&to_world.back(ray.time), ray)
 }
 
-/// The ray in an instance's space; t keeps its meaning, since the direction is not normalised.
 #[inline]
-fn local(to_world: &Transform, ray: &Ray) -> Ray {
-    let to_local = to_world.inverse();
+fn local(to_local: &Affine3, ray: &Ray) -> Ray {
     Ray {
-        origin: to_local.point(ray.origin),
-        direction: to_local.vector(ray.direction),
+        origin: to_local.transform_point3(ray.origin),
+        direction: to_local.transform_vector3(ray.direction),
         ..*ray
     }
 }

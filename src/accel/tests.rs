@@ -5,7 +5,7 @@ use std::path::Path;
 use super::*;
 use crate::description::{Description, Kind, Options, Properties};
 use crate::lanes::warp;
-use crate::math::random;
+use crate::math::{Transform, random};
 use crate::mesh::{self, Mesh};
 use crate::shape::{self, TriangleMesh};
 use glam::{DMat4, DVec3, Vec2, Vec3};

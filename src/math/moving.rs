@@ -7,7 +7,7 @@ use std::f64::consts::PI;
 use std::fmt;
 use std::sync::Arc;
 
-use glam::{DAffine3, DMat3, DMat4, DQuat, DVec3, Vec3};
+use glam::{Affine3, DAffine3, DMat3, DMat4, DQuat, DVec3, Vec3};
 
 use super::Transform;
 
@@ -297,6 +297,19 @@ impl Chain {
     }
 }
 
+impl Chain {
+    /// [`Moving::back`].
+    fn back(&self, time: f32) -> Affine3 {
+        let time = f64::from(time);
+        let inverses = self.links.iter().map(|link| match link {
+            Link::Fixed { inverse, .. } => *inverse,
+            Link::Track(track) => track.pose(track.place(time)).inverse(),
+        });
+        let back = inverses.reduce(|outer, inner| inner * outer);
+        back.unwrap_or(DAffine3::IDENTITY).as_affine3()
+    }
+}
+
 impl Moving {
     /// Moves nothing.
     pub const IDENTITY: Self = Self::Still(Transform::IDENTITY);
@@ -354,6 +367,15 @@ impl Moving {
         match self {
             Self::Still(transform) => *transform,
             Self::Keyed(chain) => chain.at(time),
+        }
+    }
+
+    /// The inverse of the transform at `time`, which takes half as long where nobody asks for the other half.
+    #[inline]
+    pub fn back(&self, time: f32) -> Affine3 {
+        match self {
+            Self::Still(transform) => *transform.back(),
+            Self::Keyed(chain) => chain.back(time),
         }
     }
 
@@ -498,6 +520,7 @@ mod tests {
                 let at = moving.at((5.0 * number(40, i)) as f32);
                 let p = vector(41, i).as_vec3();
                 assert!(at.inverse().point(at.point(p)).distance(p) < 2e-4);
+                assert_eq!(moving.back((5.0 * number(40, i)) as f32), *at.back());
             }
         }
     }

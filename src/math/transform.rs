@@ -82,6 +82,12 @@ impl Transform {
         }
     }
 
+    /// The way back, without the way there.
+    #[inline]
+    pub fn back(&self) -> &Affine3 {
+        &self.inverse
+    }
+
     /// Whether it turns right hands into left ones.
     pub fn mirrors(&self) -> bool {
         self.forward.matrix3.determinant() < 0.0

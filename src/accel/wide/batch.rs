@@ -156,35 +156,45 @@ impl Stacks {
         walker: &mut W,
     ) {
         if ray.current == LEAVE {
+            // SAFETY: as for `step`.
+            let (_, next) = unsafe { self.next::<L, ANY>(ray) };
+            // Where nothing is left outside, nobody needs to go back there. A ray that ended because it is not finite
+            // inside may have more to meet.
+            if next == DONE && ray.limit() > f32::NEG_INFINITY {
+                ray.current = DONE;
+                return;
+            }
             found::<W, ANY, LATER>(walker, ray);
             let start = walker.start(ray.ray as usize);
             // SAFETY: the caller has what `L` needs.
             unsafe { enter::<L, LATER>(ray, tree, &start) };
-        } else {
-            // SAFETY: what the ray is at was taken from its top.
-            let entry = unsafe { *self.start.add(ray.top as usize) };
-            let reached = f32::from_bits((entry >> 32) as u32);
-            match walker.other(&ray.visit(reached), ray.current & OTHER_INDEX) {
-                Met::Nothing => {}
-                Met::Better(Best { t, id, place }) => {
-                    ray.reach(t);
-                    (ray.id, ray.place) = (id, place.0);
-                    if ANY {
-                        ray.current = DONE;
-                        return;
-                    }
-                }
-                Met::Instance(inner, start) => {
-                    assert!(inner.levels <= self.inner_levels, "room for the tree");
-                    found::<W, ANY, LATER>(walker, ray);
-                    // SAFETY: there is room, and the caller has what `L` needs.
-                    unsafe {
-                        *self.start.add(ray.top as usize) = EXIT;
-                        ray.top += 1;
-                        enter::<L, LATER>(ray, inner, &start);
-                    }
+            // SAFETY: as for `step`.
+            (ray.top, ray.current) = unsafe { self.next::<L, ANY>(ray) };
+            return;
+        }
+        // SAFETY: what the ray is at was taken from its top.
+        let entry = unsafe { *self.start.add(ray.top as usize) };
+        let reached = f32::from_bits((entry >> 32) as u32);
+        match walker.other(&ray.visit(reached), ray.current & OTHER_INDEX) {
+            Met::Nothing => {}
+            Met::Better(Best { t, id, place }) => {
+                ray.reach(t);
+                (ray.id, ray.place) = (id, place.0);
+                if ANY {
+                    ray.current = DONE;
                     return;
                 }
+            }
+            Met::Instance(inner, start) => {
+                assert!(inner.levels <= self.inner_levels, "room for the tree");
+                found::<W, ANY, LATER>(walker, ray);
+                // SAFETY: there is room, and the caller has what `L` needs.
+                unsafe {
+                    *self.start.add(ray.top as usize) = EXIT;
+                    ray.top += 1;
+                    enter::<L, LATER>(ray, inner, &start);
+                }
+                return;
             }
         }
         // SAFETY: as for `step`.
