@@ -17,6 +17,7 @@ use super::memory::MemoryArguments;
 use super::progress::Told;
 use super::render::Looked;
 use super::stop::Stop;
+use super::summary::samples;
 use super::{output, report, status};
 
 /// Render all images of a manifest
@@ -166,12 +167,12 @@ fn list(arguments: &Arguments, manifest: &Manifest, stop: &Stop) -> u8 {
 }
 
 fn words(outline: &etendue::render::Outline) -> String {
-    let samples = match outline.adaptive {
-        true => format!("up to {} samples a pixel", outline.spp),
-        false => format!("{} samples a pixel", outline.spp),
+    let taken = match outline.adaptive {
+        true => format!("up to {}", samples(outline.spp)),
+        false => samples(outline.spp),
     };
     format!(
-        "{}×{}, {samples}, about {} of a processor's time, {}",
+        "{}×{}, {taken}, about {} of a processor's time, {}",
         outline.crop.width,
         outline.crop.height,
         human_duration(std::time::Duration::from_secs_f64(outline.seconds)),
@@ -214,11 +215,13 @@ fn tell(
             .map(|(name, count)| format!("{count} {name}"))
             .collect();
         let time = human_duration(began.elapsed());
-        output::line(&format!(
-            "{} images in {time}: {}",
-            done.len(),
-            counts.join(", ")
-        ));
+        let parts: Vec<&str> = match counts.is_empty() {
+            true => vec!["no image is rendered"],
+            false => counts.iter().map(String::as_str).collect(),
+        };
+        let (all, parts) = (done.len(), parts.join(", "));
+        let images = if all == 1 { "image" } else { "images" };
+        output::line(&format!("{all} {images} in {time}: {parts}"));
         for (unit, done) in manifest.units.iter().zip(done) {
             if !matches!(done.status, Status::Rendered | Status::Skipped) {
                 output::line(&format!("  {}: {done}", unit.item.output.display()));

@@ -110,7 +110,9 @@ fn outputs(arguments: &Arguments) -> Result<Vec<PathBuf>> {
         .map(expanded)
         .collect::<Result<_>>()?;
     let named = outputs.iter().zip(&arguments.inputs);
-    output::check_distinct(named.map(|(o, i)| (o.as_path(), i.display().to_string())))?;
+    let named = named.map(|(o, i)| (o.as_path(), i.display().to_string()));
+    let help = "name them after the inputs, as in -o out/{name}.png, or make one of all by --sheet";
+    output::check_distinct(named, help)?;
     Ok(outputs)
 }
 

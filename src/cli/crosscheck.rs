@@ -7,6 +7,7 @@ use std::time::Duration;
 use clap::{Args, ValueEnum};
 use etendue::crosscheck::{self, Python, Settings, Side, Watch};
 use etendue::error::{Error, Result};
+use etendue::render::is_mesh;
 
 use super::oracle::Subject;
 use super::overrides::ImageArguments;
@@ -162,6 +163,12 @@ impl Arguments {
         if self.reference.is_some() && self.scenes.len() > 1 {
             let message = "--reference is another form of one scene, and there are several";
             return Err(Error::input(message));
+        }
+        if let Some(mesh) = self.scenes.iter().find(|scene| is_mesh(scene)) {
+            let mesh = mesh.display();
+            let error = Error::input(format!("{mesh} is a mesh, and a scene is wanted"));
+            let help = "write the scene around it: etendue render";
+            return Err(error.help(format!("{help} {mesh} -o OUT.png --write-scene OUT.xml")));
         }
         let plugins = self.plugins.clone();
         if let Some(folder) = plugins.as_ref().filter(|folder| !folder.is_dir()) {

@@ -126,15 +126,14 @@ fn has(command: &Command, option: &str) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use clap::{CommandFactory, Parser};
+    use clap::CommandFactory;
 
     use super::*;
     use crate::cli::Arguments;
 
     fn said(line: &str) -> String {
         let words: Vec<OsString> = line.split(' ').map(OsString::from).collect();
-        let error = Arguments::try_parse_from(&words).expect_err("it is wrong");
-        better(error, &Arguments::command(), &words).to_string()
+        Arguments::of(&words).expect_err("it is wrong").to_string()
     }
 
     #[test]

@@ -9,6 +9,7 @@ use etendue::sensor::Window;
 use etendue::{display, image};
 
 use super::memory::MemoryArguments;
+use super::summary::samples;
 use super::{output, parse, status};
 
 /// Make an image of parts
@@ -82,11 +83,11 @@ fn tell(arguments: &Arguments, report: &MergeReport) {
         output::object(object);
     } else if !arguments.quiet {
         output::line(&format!(
-            "{}: {}×{}, {} samples a pixel, of {} parts, {}",
+            "{}: {}×{}, {}, of {} parts, {}",
             arguments.output.display(),
             report.width,
             report.height,
-            report.spp,
+            samples(report.spp),
             report.parts,
             human_duration(std::time::Duration::from_secs_f64(report.seconds))
         ));

@@ -43,9 +43,10 @@ mod turntable;
 mod verdicts;
 mod version;
 
+use std::ffi::OsString;
 use std::process::ExitCode;
 
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches as _, Parser, Subcommand};
 
 /// Étendue: a CPU ray tracer for Mitsuba 3 scenes and bare meshes.
 #[derive(Debug, Parser)]
@@ -81,12 +82,31 @@ enum Command {
 /// The name of the hidden command that serves [`Command::Crosscheck`].
 const CROSSCHECK_WORKER: &str = "crosscheck-worker";
 
+impl Arguments {
+    /// What the words of a command line say, its own name first.
+    fn of(words: &[OsString]) -> Result<Self, clap::Error> {
+        let command = with_negative_numbers(Self::command());
+        let parsed = command.clone().try_get_matches_from(words);
+        parsed
+            .and_then(|matches| Self::from_arg_matches(&matches))
+            .map_err(|error| hints::better(error, &command, words))
+    }
+}
+
+/// A number below 0 is an option's value, so that it is the option that says what it takes.
+fn with_negative_numbers(command: clap::Command) -> clap::Command {
+    let command = command.mut_args(|argument| match argument.get_action().takes_values() {
+        true => argument.allow_negative_numbers(true),
+        false => argument,
+    });
+    command.mut_subcommands(with_negative_numbers)
+}
+
 /// Runs the command that the arguments name.
 pub(crate) fn run() -> ExitCode {
     stop::Stop::instead_of_aborts();
     let words: Vec<_> = std::env::args_os().collect();
-    let arguments = Arguments::try_parse_from(&words)
-        .unwrap_or_else(|error| hints::better(error, &Arguments::command(), &words).exit());
+    let arguments = Arguments::of(&words).unwrap_or_else(|error| error.exit());
     let result = match arguments.command {
         Command::Render(arguments) => render::run(&arguments),
         Command::Batch(arguments) => batch::run(&arguments),

@@ -96,17 +96,16 @@ pub(super) fn with_frame(text: &str, number: i64) -> String {
     out
 }
 
-/// Refuses names that two images would share.
+/// Refuses names that two images would share; `help` says how to tell them apart.
 pub(super) fn check_distinct<'a>(
     outputs: impl IntoIterator<Item = (&'a Path, String)>,
+    help: &str,
 ) -> Result<()> {
     let mut seen: HashMap<&Path, String> = HashMap::new();
     for (output, what) in outputs {
         if let Some(other) = seen.get(output) {
             let output = output.display();
             let message = format!("{other} and {what} would both be written to {output}");
-            let help =
-                "give each an output of its own, such as -o out/{name}-{frame:04}-{sensor}.exr";
             return Err(Error::input(message).help(help));
         }
         seen.insert(output, what);
@@ -232,8 +231,8 @@ mod tests {
     #[test]
     fn two_images_of_one_name_are_refused() {
         let (a, b) = (Path::new("a.png"), Path::new("b.png"));
-        assert!(check_distinct([(a, "1".into()), (b, "2".into())]).is_ok());
-        let error = check_distinct([(a, "x.xml".into()), (a, "y.xml".into())]).unwrap_err();
+        assert!(check_distinct([(a, "1".into()), (b, "2".into())], "").is_ok());
+        let error = check_distinct([(a, "x.xml".into()), (a, "y.xml".into())], "").unwrap_err();
         assert!(error.to_string().starts_with("x.xml and y.xml would both"));
     }
 }

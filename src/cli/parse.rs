@@ -126,6 +126,17 @@ pub(super) fn seconds(text: &str) -> Parsed<std::time::Duration> {
     Ok(std::time::Duration::from_secs_f64(seconds))
 }
 
+/// Seconds between two times that something is done.
+pub(super) fn interval(text: &str) -> Parsed<std::time::Duration> {
+    /// More often nothing else would be done.
+    const SHORTEST: f64 = 0.01;
+    let seconds = seconds(text)?;
+    match seconds.as_secs_f64() < SHORTEST {
+        true => Err(format!("write {SHORTEST} seconds or more")),
+        false => Ok(seconds),
+    }
+}
+
 /// A positive number.
 pub(super) fn positive(text: &str) -> Parsed<f64> {
     let number: f64 = text.parse().map_err(|_| "write a number such as 0.005")?;

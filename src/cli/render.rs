@@ -110,7 +110,7 @@ pub(super) struct Arguments {
     #[arg(long, help_heading = RUN)]
     resume: bool,
     /// Write the image as it stands every so many seconds; the signal SIGUSR1 asks for it too
-    #[arg(long, value_name = "SECONDS", value_parser = parse::seconds, help_heading = RUN)]
+    #[arg(long, value_name = "SECONDS", value_parser = parse::interval, help_heading = RUN)]
     snapshot: Option<Duration>,
     /// First write a picture by the z-buffer, within moments and before there is a tree: with direct light alone, shadows
     /// by maps and nothing blurred. The image as asked for takes its place when it is done
@@ -310,12 +310,20 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     stop.hear_wishes()?;
     let budget = arguments.run.memory.budget_until(&stop);
     let Images { items, failed } = arguments.images(&budget)?;
-    output::check_distinct((items.iter()).flat_map(|i| i.files().map(|file| (file, i.name()))))?;
+    let files = (items.iter()).flat_map(|i| i.files().map(|file| (file, i.name())));
+    let help = "give each an output of its own, such as -o out/{name}-{frame:04}-{sensor}.exr";
+    output::check_distinct(files, help)?;
     let wanted = items.iter().filter(|item| !arguments.skips(item));
     output::check_writable(wanted.flat_map(Item::files))?;
     let mut series = Series::new(arguments, budget, stop);
     let threads = arguments.run.threads.map_or(0, |threads| threads.get());
     series.denoiser = arguments.denoising.denoiser(threads)?;
+    if let Some(option) = arguments.staging.given()
+        && !items.iter().any(|item| is_mesh(&item.input))
+    {
+        let message = format!("{option} is for bare meshes, and no input is one");
+        series.warn_of(&Error::input(message).problems()[0]);
+    }
     let style = arguments.style();
     let mut endings = Vec::new();
     for (input, error) in failed {

@@ -1,6 +1,6 @@
 //! Arguments on how a bare mesh is shown.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use etendue::render::{Background, Finish, Lighting, Staging, UpAxis};
@@ -30,8 +30,8 @@ pub(super) struct StagingArguments {
     #[arg(long, value_enum, default_value_t = Finishes::Clay, value_name = "NAME", help_heading = BARE)]
     material: Finishes,
     /// What lights it: "studio", "sun", "sky", or an image of all around by longitude and latitude
-    #[arg(long, default_value = "studio", value_name = "NAME|IMAGE", help_heading = BARE)]
-    light: String,
+    #[arg(long, default_value = "studio", value_name = "NAME|IMAGE", value_parser = lighting, help_heading = BARE)]
+    light: Lighting,
     /// What is seen beside it: "sky", a radiance such as 1,1,1, or "transparent", which leaves out the ground too
     #[arg(long, default_value = "sky", value_name = "R,G,B|transparent", value_parser = background, help_heading = BARE)]
     background: Background,
@@ -46,6 +46,24 @@ pub(super) struct StagingArguments {
 const BARE: &str = "A bare mesh";
 
 impl StagingArguments {
+    /// The first of them that asks for something.
+    pub(super) fn given(&self) -> Option<&'static str> {
+        let given = [
+            (self.azimuth.is_some(), "--azimuth"),
+            (self.elevation.is_some(), "--elevation"),
+            (self.distance.is_some(), "--distance"),
+            (self.fov.is_some(), "--fov"),
+            (self.target.is_some(), "--target"),
+            (!matches!(self.material, Finishes::Clay), "--material"),
+            (!matches!(self.light, Lighting::Studio), "--light"),
+            (!matches!(self.background, Background::Sky), "--background"),
+            (self.no_ground, "--no-ground"),
+            (self.write_scene.is_some(), "--write-scene"),
+        ];
+        let given = given.into_iter().find(|(is_given, _)| *is_given);
+        given.map(|(_, option)| option)
+    }
+
     /// What they ask for, of an image of this size.
     pub(super) fn staging(&self, up: UpAxis, size: Option<(u32, u32)>, turns: bool) -> Staging {
         let default = Staging::default();
@@ -67,15 +85,21 @@ impl StagingArguments {
                 Finishes::Glass => Finish::Glass,
                 Finishes::Plastic => Finish::Plastic,
             },
-            lighting: match self.light.as_str() {
-                "studio" => Lighting::Studio,
-                "sun" => Lighting::Sun,
-                "sky" => Lighting::Sky,
-                image => Lighting::Environment(image.into()),
-            },
+            lighting: self.light.clone(),
             background: self.background,
             ground: !self.no_ground,
         }
+    }
+}
+
+/// Where light comes from.
+fn lighting(text: &str) -> Result<Lighting, String> {
+    match text {
+        "studio" => Ok(Lighting::Studio),
+        "sun" => Ok(Lighting::Sun),
+        "sky" => Ok(Lighting::Sky),
+        image if Path::new(image).is_file() => Ok(Lighting::Environment(image.into())),
+        _ => Err("write studio, sun, sky, or the name of an image that is there".to_owned()),
     }
 }
 

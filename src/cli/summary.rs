@@ -56,15 +56,20 @@ impl Ending {
     }
 }
 
+/// How many samples a pixel has, in words.
+pub(super) fn samples(spp: u32) -> String {
+    format!("{spp} sample{} a pixel", if spp == 1 { "" } else { "s" })
+}
+
 /// The warning that an image is not whole.
 pub(super) fn incomplete(item: &Item, report: &Report) -> Error {
     let completed = &report.completed;
     let ([passes, of_passes], [tiles, of_tiles]) = (completed.passes, completed.units);
     let mut message = format!(
-        "{} is not whole: {passes} of {of_passes} passes ({tiles} of {of_tiles} tiles) are done, {} of {} samples a pixel",
+        "{} is not whole: {passes} of {of_passes} passes ({tiles} of {of_tiles} tiles) are done, {} of {}",
         item.output.display(),
         completed.samples,
-        report.spp
+        samples(report.spp)
     );
     if passes == 0 {
         message += "; where no tile is done it is black";
@@ -132,22 +137,22 @@ pub(super) fn object(item: &Item, ending: &Ending, total: Duration) -> Value {
 
 fn line(path: &Path, report: &Report, total: Duration) {
     let [width, height] = report.size;
-    let samples = match &report.adaptive {
+    let taken = match &report.adaptive {
         None => match &report.passes {
-            None => format!("{} samples a pixel", report.completed.samples),
+            None => samples(report.completed.samples),
             Some(passes) => format!("passes {}:{}", passes.start, passes.end),
         },
         Some(adaptive) => {
             let (mean, [least, most]) = (adaptive.mean_spp, adaptive.limits);
-            let mut samples = format!("{mean:.1} samples a pixel, {least} to {most}");
+            let mut taken = format!("{mean:.1} samples a pixel, {least} to {most}");
             if adaptive.at_limit > 0.0 {
-                samples += &format!(" ({:.1} % have all of them)", 100.0 * adaptive.at_limit);
+                taken += &format!(" ({:.1} % have all of them)", 100.0 * adaptive.at_limit);
             }
-            samples
+            taken
         }
     };
     output::line(&format!(
-        "{}: {width}×{height}, {samples}, {}",
+        "{}: {width}×{height}, {taken}, {}",
         path.display(),
         human_duration(total)
     ));

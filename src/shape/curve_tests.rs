@@ -466,9 +466,10 @@ fn tubes_have_the_areas_of_cylinders_cones_and_balls() {
 /// and a point that a ray meets has the density with which it was drawn.
 #[test]
 fn points_are_drawn_on_tubes_with_the_density_that_is_told() {
-    let plugin = "bsplinecurve";
-    let tubes = curves(plugin, TEXT, "");
-    for from in [DVec3::new(1.0, 2.0, 0.5), DVec3::new(1.2, 0.9, 0.1)] {
+    let places = [DVec3::new(1.0, 2.0, 0.5), DVec3::new(1.2, 0.9, 0.1)];
+    let cases = ["bsplinecurve", "linearcurve"].map(|plugin| places.map(|from| (plugin, from)));
+    for (plugin, from) in cases.into_iter().flatten() {
+        let tubes = curves(plugin, TEXT, "");
         let n = 20_000_u32;
         let (mut drawn, mut squared, mut found) = (0.0, 0.0, 0.0);
         for i in 0..n {

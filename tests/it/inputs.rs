@@ -777,6 +777,44 @@ const COMMANDS: &[(&str, i32, &str)] = &[
     ("crosscheck scene.xml --seed 2147483648", 2, "--seed"),
     ("crosscheck scene.xml --precision 0", 2, "0 is not positive"),
     ("crosscheck scene.xml --timeout inf", 2, "not between"),
+    ("crosscheck nan.ply", 2, "--write-scene OUT.xml"),
+    // A number below 0 is a value, and told its range.
+    ("render a.ply -o b.png --distance -1", 2, "0.01 to 1000"),
+    ("render a.ply -o b.png --spp -1", 2, "'-1' for '--spp <N>'"),
+    (
+        "render a.ply -o b.png --noise-threshold -1",
+        2,
+        "not positive",
+    ),
+    (
+        "render a.ply -o b.png --snapshot 0",
+        2,
+        "0.01 seconds or more",
+    ),
+    ("render a.ply -o b.png --light moon", 2, "studio, sun, sky"),
+    (
+        "render scene.xml -o b.png --material metal",
+        0,
+        "--material is for bare meshes",
+    ),
+    (
+        "render nan.ply -o b.png",
+        1,
+        "of each of its 1 a corner is not finite",
+    ),
+    (
+        "render points.obj -o b.png",
+        1,
+        "points and lines alone are not drawn",
+    ),
+    (
+        "batch twice.toml",
+        1,
+        "scene.xml --spp=1 and scene.xml --spp=2 would both be written to b.png",
+    ),
+    ("batch none.toml", 1, "list of scenes is empty"),
+    ("batch typo.toml", 1, "'--size'"),
+    ("batch word.toml", 1, "whole number in digits"),
 ];
 
 #[test]
@@ -785,6 +823,27 @@ fn every_wrong_command_line_is_named_and_survived() {
     let scene = scene_of(&usage("", "", 0, &[]));
     fs::write(folder.path().join("scene.xml"), scene).expect("the folder is there");
     fs::write(folder.path().join("empty.exr"), "").expect("the folder is there");
+    const NAN: &str = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+        element face 1\nproperty list uchar int vertex_indices\nend_header\nnan 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+    for (name, text) in [
+        ("nan.ply", NAN),
+        ("points.obj", "v 0 0 0\nv 1 0 0\n"),
+        (
+            "twice.toml",
+            "[[images]]\nscenes = 'scene.xml'\noutput = 'b.png'\nspp = [1, 2]",
+        ),
+        ("none.toml", "[[images]]\nscenes = []\noutput = 'b.png'"),
+        (
+            "typo.toml",
+            "[[images]]\nscenes = 'scene.xml'\noutput = 'b.png'\nsise = '4x4'",
+        ),
+        (
+            "word.toml",
+            "[[images]]\nscenes = 'scene.xml'\noutput = 'b.png'\nspp = 'four'",
+        ),
+    ] {
+        fs::write(folder.path().join(name), text).expect("the folder is there");
+    }
     for (name, size) in [("a.exr", "4x4"), ("dot.exr", "1x1")] {
         let arguments = [
             "render",

@@ -1,10 +1,10 @@
 //! A manifest: tables of options of `etendue render`, taken apart into the images that they mean.
 
+use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
-use clap::Parser;
 use etendue::budget::Budget;
 use etendue::error::{Error, Location, Result};
 
@@ -91,11 +91,9 @@ impl Manifest {
                 Err(error) => manifest.failed.push(error.at(&location)),
             }
         }
-        let outputs = manifest.units.iter().map(|unit| {
-            let (output, name) = (unit.item.output.as_path(), unit.item.name());
-            (output, name)
-        });
-        crate::cli::output::check_distinct(outputs)?;
+        let outputs = (manifest.units.iter()).map(|unit| (unit.item.output.as_path(), unit.call()));
+        let help = "let {name}, {frame}, {sensor} or a key of the entry, such as {spp}, tell outputs apart";
+        crate::cli::output::check_distinct(outputs, help)?;
         Ok(manifest)
     }
 
@@ -152,6 +150,11 @@ impl Manifest {
 }
 
 impl Unit {
+    /// The input with its options.
+    fn call(&self) -> String {
+        self.arguments[1..].join(" ")
+    }
+
     /// As a shell takes it, with the output.
     pub(super) fn shell(&self) -> String {
         let output = self.item.output.display().to_string();
@@ -174,12 +177,17 @@ fn quoted(word: &str) -> String {
 
 /// The arguments of a call, by the same checks as those of the command line.
 fn parse(scene: &str, output: &str, options: &[String]) -> Result<render::Arguments> {
-    let words = ["etendue", "render", scene, "-o", output].map(str::to_owned);
-    let parsed = Arguments::try_parse_from(words.iter().chain(options)).map_err(|error| {
+    let words = ["etendue", "render", scene, "-o", output].map(OsString::from);
+    let options = options.iter().map(OsString::from);
+    let words: Vec<OsString> = words.into_iter().chain(options).collect();
+    let parsed = Arguments::of(&words).map_err(|error| {
         let text = error.to_string();
-        let text = text.lines().next().unwrap_or_default();
-        let text = text.strip_prefix("error: ").unwrap_or(text);
-        Error::input(text).help("keys are the long options of etendue render: see its --help")
+        let mut lines = text.lines();
+        let what = lines.next().unwrap_or_default();
+        let what = what.strip_prefix("error: ").unwrap_or(what);
+        let tip = lines.find_map(|line| line.trim().strip_prefix("tip: "));
+        let help = "keys are the long options of etendue render: see its --help";
+        Error::input(what).help(tip.unwrap_or(help))
     })?;
     match parsed.command {
         Command::Render(arguments) => Ok(*arguments),
@@ -221,6 +229,9 @@ impl Entry {
         };
         let lacks = |name: &str| Error::input(format!("the entry has no {name:?}"));
         let scenes = take(SCENES)?.ok_or_else(|| lacks(SCENES))?;
+        if scenes.is_empty() {
+            return Err(Error::input("the entry's list of scenes is empty"));
+        }
         let outputs = take(OUTPUT)?.ok_or_else(|| lacks(OUTPUT))?;
         let [output] = &outputs[..] else {
             return Err(Error::input("an entry has one output")

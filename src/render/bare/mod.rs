@@ -72,10 +72,15 @@ pub fn describe_mesh(
     let read_options = ReadOptions::BARE;
     let mut loaded = read(path, &read_options, budget)?;
     let Some(bounds) = loaded.mesh.bounds() else {
-        return Err(Error::input(format!(
-            "{} holds no triangle",
-            path.display()
-        )));
+        let error = match loaded.dropped_triangles {
+            0 => Error::input("the file holds no triangle")
+                .help("a mesh has faces; points and lines alone are not drawn"),
+            dropped => Error::input(format!(
+                "no triangle is left: of each of its {dropped} a corner is not finite"
+            ))
+            .help("`etendue mesh report` says what is in the file"),
+        };
+        return Err(error.at(&Location::of_file(path)));
     };
     if !has_area(&loaded.mesh) {
         let message = "none of the triangles has an area: there is nothing to see";
