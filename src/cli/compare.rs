@@ -29,7 +29,7 @@ use super::{output, parse, report, status};
 #[derive(Args, Debug)]
 #[command(after_help = HELP, after_long_help = LONG_HELP)]
 pub(super) struct Arguments {
-    /// Two images, the reference first (EXR, HDR, PNG, JPEG, BMP, TGA); with --reference only one
+    /// Two images, the reference first (EXR, HDR, PFM, TIFF, PNG, JPEG, BMP, TGA, PPM); with --reference only one
     #[arg(value_name = "IMAGE", num_args = 1..=2, required_unless_present = "a", conflicts_with = "a")]
     images: Vec<PathBuf>,
     /// Compare the channels NAME.* or the one channel NAME, not the main colour

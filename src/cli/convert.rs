@@ -18,9 +18,9 @@ use super::{parse, report, status};
 
 /// Convert images, and make pictures of renders
 ///
-/// Reads EXR, HDR, PFM, PNG, JPEG, BMP, TGA and PPM. The extension of OUT says the format: .exr (all channels), .hdr
-/// and .pfm (main colour) hold linear values; .png and .jpg are for screens, and the options below say how linear values
-/// become their codes. Codes that are read are taken for sRGB.
+/// Reads EXR, HDR, PFM, TIFF, PNG, JPEG, BMP, TGA and PPM. The extension of OUT says the format: .exr (all channels), .hdr
+/// and .pfm (main colour) hold linear values; .tif, .png and .jpg are for screens, and the options below say how linear
+/// values become their codes. With --bits 32 .tif holds linear values too. Codes that are read are taken for sRGB.
 #[derive(Args, Debug)]
 #[command(after_help = format!("{EXAMPLES}\n\n{}", status::HELP))]
 pub(super) struct Arguments {
@@ -58,6 +58,7 @@ Examples:
   etendue convert room.exr -o room.png --exposure auto --view agx
   etendue convert a.exr b.exr -o out/{name}.png --view local
   etendue convert room.exr -o hdr.png --encode pq --gamut bt2020 --bits 16
+  etendue convert room.exr -o linear.tif --bits 32
   etendue convert room.exr -o albedo.png --layer albedo
   etendue convert left.exr right.exr -o pair.png --sheet 2";
 
@@ -66,6 +67,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     let outputs = outputs(arguments)?;
     for output in &outputs {
         image::check_writable(output)?;
+        arguments.display.transform().check(output)?;
     }
     let denoiser = arguments.denoising.denoiser(0)?;
     if let Some(columns) = arguments.sheet {

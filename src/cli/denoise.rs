@@ -86,6 +86,7 @@ Examples:
 /// Runs the command; the answer is the exit status.
 pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     image::check_writable(&arguments.output)?;
+    arguments.display.transform().check(&arguments.output)?;
     let denoiser = arguments.library.denoiser(0)?;
     let picture = image::read(&arguments.input, &arguments.memory.budget().open())?;
     if !arguments.quiet {

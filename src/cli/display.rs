@@ -5,7 +5,7 @@ use etendue::display::{Depth, DisplayTransform, Exposure, Gamut, Transfer, View}
 
 use super::parse;
 
-/// How PNG is made of linear values.
+/// How pictures for a screen are made of linear values.
 #[derive(Args, Debug)]
 pub(super) struct DisplayArguments {
     /// Make the picture brighter by this many stops, or "auto": the geometric mean of luminance becomes middle
@@ -25,15 +25,15 @@ pub(super) struct DisplayArguments {
     /// bt2020 and --bits 16)
     #[arg(long, default_value = "srgb", value_name = "CURVE", value_parser = transfer, help_heading = DISPLAY)]
     encode: Transfer,
-    /// Bits of a code
-    #[arg(long, default_value = "8", value_name = "8|16", value_parser = depth, help_heading = DISPLAY)]
+    /// Bits of a code; 32 leaves linear values as they are, as floats, which of .tif, .png and .jpg only .tif has
+    #[arg(long, default_value = "8", value_name = "8|16|32", value_parser = depth, help_heading = DISPLAY)]
     bits: Depth,
     /// Hide the bands of smooth gradients by blue noise of less than a code
     #[arg(long, help_heading = DISPLAY)]
     dither: bool,
 }
 
-const DISPLAY: &str = "From linear values to PNG";
+const DISPLAY: &str = "From linear values to TIFF, PNG and JPEG";
 
 impl DisplayArguments {
     /// What they ask for.
@@ -116,7 +116,8 @@ fn depth(text: &str) -> Result<Depth, String> {
     match text {
         "8" => Ok(Depth::Eight),
         "16" => Ok(Depth::Sixteen),
-        _ => Err("there are 8 and 16".to_owned()),
+        "32" => Ok(Depth::Float),
+        _ => Err("there are 8, 16 and 32".to_owned()),
     }
 }
 

@@ -22,7 +22,7 @@ use super::{output, parse, status};
 pub(super) struct Arguments {
     /// Image with layers (.exr)
     input: PathBuf,
-    /// Where the image goes: .exr or .hdr (linear), .png (8-bit sRGB)
+    /// Where the image goes: .exr or .hdr (linear), .tif, .png or .jpg (for screens)
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
     /// Multiply the layers of that name, one number or three for R,G,B: diffuse=0.5, light.lamp=2,1,0.5; a word
@@ -44,6 +44,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     let of_input = |error: Error| error.at(&etendue::error::Location::of_file(&arguments.input));
     if let Some(output) = &arguments.output {
         image::check_writable(output)?;
+        arguments.display.transform().check(output)?;
         let relit = relight::relight(&image, &arguments.weights).map_err(of_input)?;
         let mut metadata = Metadata::default()
             .with("software", concat!("etendue ", env!("CARGO_PKG_VERSION")))

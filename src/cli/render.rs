@@ -37,7 +37,7 @@ use super::{output, report, status};
 ///
 /// INPUT is a Mitsuba 3 scene (.xml), a bare mesh (.ply, .obj, .stl, .serialized, .gltf, .glb), which gets an automatic
 /// camera on a ground under a soft sky, or a folder of these. The extension of OUT says the format: .exr (linear, float32, with metadata and
-/// all channels), .hdr (linear), .png (sRGB), or .part: the sums that `etendue merge` makes images of.
+/// all channels), .hdr (linear), .png or .tif (sRGB), or .part: the sums that `etendue merge` makes images of.
 ///
 /// Ctrl-C, SIGTERM and SIGHUP end a render early: the tiles under way are finished and the image of what
 /// is complete is written. A second signal ends the process at once.
@@ -315,6 +315,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     output::check_distinct(files, help)?;
     let wanted = items.iter().filter(|item| !arguments.skips(item));
     output::check_writable(wanted.flat_map(Item::files))?;
+    let display = arguments.display.transform();
+    for item in items.iter().filter(|item| !is_part(&item.output)) {
+        display.check(&item.output)?;
+    }
     let mut series = Series::new(arguments, budget, stop);
     let threads = arguments.run.threads.map_or(0, |threads| threads.get());
     series.denoiser = arguments.denoising.denoiser(threads)?;

@@ -13,8 +13,8 @@ use super::output::with_frame;
 use super::parse;
 
 /// What images are called.
-const IMAGES: [&str; 10] = [
-    "exr", "hdr", "pfm", "png", "jpg", "jpeg", "bmp", "tga", "ppm", "pgm",
+const IMAGES: [&str; 12] = [
+    "exr", "hdr", "pfm", "tif", "tiff", "png", "jpg", "jpeg", "bmp", "tga", "ppm", "pgm",
 ];
 
 /// How scenes are read.

@@ -1,6 +1,7 @@
 //! From scene-referred to display-referred. A [`DisplayTransform`] makes linear values into codes for a screen: exposure,
 //! a view (how more light than a display has is compressed), glare, the display's primaries, its curve, and as many bits
-//! as it has. [`save`] is how renders leave: EXR, HDR and PFM stay linear, PNG is encoded.
+//! as it has. [`save`] is how renders leave: EXR, HDR and PFM stay linear, PNG and JPEG are encoded, and TIFF
+//! is either.
 
 pub mod diagram;
 pub mod srgb;
@@ -65,6 +66,8 @@ pub enum Depth {
     Eight,
     /// 65,536 codes.
     Sixteen,
+    /// No codes: linear values as they are, as float32, which of these formats only TIFF has.
+    Float,
 }
 
 /// What lies between linear values and codes. By default exactly sRGB in 8 bits.
@@ -104,12 +107,32 @@ impl Default for DisplayTransform {
 const GRAIN: usize = 1 << 13;
 
 impl DisplayTransform {
-    /// Writes the codes of an image's main colour, and of its straight opacity if it has a channel A, as PNG or JPEG.
+    /// Finds out whether an image can be written as a file of this name.
     ///
     /// # Errors
-    /// Where the image has neither R, G, B nor X, Y, Z nor Y, or no pixels; where the file system refuses.
+    /// Where its format has not as many bits, or cannot say what the codes mean; where the extension is unknown.
+    pub fn check(&self, path: &Path) -> Result<()> {
+        match (Format::of_output(path)?, self.depth) {
+            (Format::Png | Format::Jpeg, Depth::Float) => {
+                Err(Error::input("PNG and JPEG have no floats")
+                    .help("use .tif, or .exr, .hdr or .pfm, which always have"))
+            }
+            (_, Depth::Float) => Ok(()),
+            (_, Depth::Eight) => image::check_codes(path, 8, self.tag()),
+            (_, Depth::Sixteen) => image::check_codes(path, 16, self.tag()),
+        }
+    }
+
+    /// Writes the codes of an image's main colour, and of its straight opacity if it has a channel A, as PNG, TIFF or
+    /// JPEG; or as TIFF their linear values.
+    ///
+    /// # Errors
+    /// Where the image has neither R, G, B nor X, Y, Z nor Y, or no pixels; where the format cannot hold them, or the file
+    /// system refuses.
     pub fn write(&self, path: &Path, image: &Image) -> Result<()> {
+        self.check(path)?;
         match self.depth {
+            Depth::Float => image::write(path, image, &Metadata::default()),
             Depth::Eight => image::write_codes(path, &self.codes::<u8>(image)?, self.tag()),
             Depth::Sixteen => image::write_codes(path, &self.codes::<u16>(image)?, self.tag()),
         }
@@ -274,8 +297,8 @@ impl Quantised for u16 {
 }
 
 /// Writes an image in linear BT.709 or XYZ in the format of the extension: `.exr` (every channel, metadata), `.hdr` or
-/// `.pfm` (main colour), `.png` or `.jpg` (main colour, PNG with opacity, as `display` makes them into codes). The file
-/// appears whole or not at all.
+/// `.pfm` (main colour), `.tif`, `.png` or `.jpg` (main colour, TIFF and PNG with opacity, as `display` makes them into
+/// codes). The file appears whole or not at all.
 ///
 /// # Errors
 /// Where the extension is another, the format cannot hold the image, or the file system refuses.
@@ -286,7 +309,7 @@ pub fn save(
     display: &DisplayTransform,
 ) -> Result<()> {
     match Format::of_output(path)? {
-        Format::Png | Format::Jpeg => display.write(path, image),
+        Format::Tiff | Format::Png | Format::Jpeg => display.write(path, image),
         Format::Hdr | Format::Pfm => image::write(path, &image.in_rgb(), metadata),
         Format::Exr => image::write(path, image, metadata),
     }
@@ -304,7 +327,7 @@ pub fn save_window(
     display: &DisplayTransform,
 ) -> Result<()> {
     match Format::of_output(path)? {
-        Format::Png | Format::Jpeg | Format::Hdr | Format::Pfm => {
+        Format::Tiff | Format::Png | Format::Jpeg | Format::Hdr | Format::Pfm => {
             save(path, image, metadata, display)
         }
         Format::Exr => image::write_window(path, image, window, metadata),

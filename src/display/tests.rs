@@ -22,6 +22,7 @@ fn one_image_leaves_in_every_format_linear_or_encoded() {
         ("a.exr", Encoding::Linear, 0.5),
         ("a.HDR", Encoding::Linear, 0.5),
         ("a.pfm", Encoding::Linear, 0.5),
+        ("a.tif", Encoding::Srgb, 188.0 / 255.0),
         ("a.jpg", Encoding::Srgb, 188.0 / 255.0),
         ("a.png", Encoding::Srgb, 188.0 / 255.0),
     ] {
@@ -39,9 +40,11 @@ fn one_image_leaves_in_every_format_linear_or_encoded() {
 fn an_unknown_extension_names_the_known_ones() {
     let image = Image::new(1, 1, vec!["Y".into()]);
     let display = DisplayTransform::default();
-    let error = save(Path::new("a.tiff"), &image, &Metadata::default(), &display).unwrap_err();
+    let error = save(Path::new("a.webp"), &image, &Metadata::default(), &display).unwrap_err();
     assert!(
-        error.to_string().contains(".exr, .hdr, .pfm, .png or .jpg"),
+        error
+            .to_string()
+            .contains(".exr, .hdr, .pfm, .tif, .png or .jpg"),
         "{error}"
     );
 }

@@ -1,4 +1,4 @@
-//! Images of codes of 8 or 16 bits, and their file formats, PNG and JPEG. The display layer makes them, and says by a [`Tag`] what
+//! Images of codes of 8 or 16 bits, and their file formats, PNG, TIFF and JPEG. The display layer makes them, and says by a [`Tag`] what
 //! they mean.
 
 use std::borrow::Cow;
@@ -11,6 +11,7 @@ use libjpeg_turbo_rs::{Encoder, PixelFormat, Subsampling};
 use crate::error::{Error, Result};
 use crate::file;
 use crate::image::format::Format;
+use crate::image::tiff;
 
 /// The channels of an image of codes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -78,6 +79,11 @@ pub trait Code: Copy {
     const COLORS: [ExtendedColorType; 4];
     /// The memory's bytes.
     fn bytes(codes: &[Self]) -> Cow<'_, [u8]>;
+    /// The bytes of a TIFF file of `codes`, interleaved.
+    ///
+    /// # Errors
+    /// Where such a file cannot hold them.
+    fn to_tiff(size: [u32; 2], layout: Layout, codes: &[Self]) -> Result<Vec<u8>>;
 }
 
 impl Code for u8 {
@@ -91,6 +97,10 @@ impl Code for u8 {
     fn bytes(codes: &[u8]) -> Cow<'_, [u8]> {
         Cow::Borrowed(codes)
     }
+
+    fn to_tiff(size: [u32; 2], layout: Layout, codes: &[u8]) -> Result<Vec<u8>> {
+        tiff::encode_samples(size, layout, codes)
+    }
 }
 
 impl Code for u16 {
@@ -103,6 +113,10 @@ impl Code for u16 {
 
     fn bytes(codes: &[u16]) -> Cow<'_, [u8]> {
         codes.iter().flat_map(|code| code.to_ne_bytes()).collect()
+    }
+
+    fn to_tiff(size: [u32; 2], layout: Layout, codes: &[u16]) -> Result<Vec<u8>> {
+        tiff::encode_samples(size, layout, codes)
     }
 }
 
@@ -181,7 +195,7 @@ impl<T: Code> Codes<T> {
     pub fn to_jpeg(&self) -> Result<Vec<u8>> {
         const QUALITY: u8 = 95;
         if size_of::<T>() != 1 {
-            return Err(Error::input("JPEG has 8 bits a channel").help("use .png for 16"));
+            return Err(only_eight());
         }
         let (format, colours) = match self.layout {
             Layout::Grey | Layout::GreyAlpha => (PixelFormat::Grayscale, 1),
@@ -210,25 +224,44 @@ fn chunk(tag: Tag) -> Vec<u8> {
     [&length.to_be_bytes()[..], &checked, &check.to_be_bytes()].concat()
 }
 
-/// Writes codes as a PNG or a JPEG file, whole or not at all. JPEG is always taken for sRGB.
+/// Writes codes as a PNG, a TIFF or a JPEG file, whole or not at all. The last two are always taken for sRGB.
 ///
 /// # Errors
 /// Where the extension is another or the format cannot hold the codes, or the file system refuses.
 pub fn write_codes<T: Code>(path: &Path, codes: &Codes<T>, tag: Tag) -> Result<()> {
     let bytes = match Format::of_output(path)? {
         Format::Png => codes.to_png(tag)?,
-        Format::Jpeg if tag == Tag::Srgb => codes.to_jpeg()?,
-        Format::Jpeg => {
-            let error = Error::input("a JPEG file cannot say that its codes are no sRGB");
-            return Err(error.help("use .png"));
-        }
+        Format::Jpeg | Format::Tiff if tag != Tag::Srgb => return Err(no_srgb()),
+        Format::Jpeg => codes.to_jpeg()?,
+        Format::Tiff => T::to_tiff([codes.width, codes.height], codes.layout, &codes.data)?,
         Format::Exr | Format::Hdr | Format::Pfm => {
             let path = path.display();
             return Err(
                 Error::input(format!("a picture for screens cannot be stored as {path}"))
-                    .help("use .png or .jpg"),
+                    .help("use .png, .tif or .jpg"),
             );
         }
     };
     file::write_atomically(path, &bytes)
+}
+
+fn no_srgb() -> Error {
+    Error::input("JPEG and TIFF files cannot say that their codes are no sRGB").help("use .png")
+}
+
+/// Finds out whether codes of so many bits, which mean this, can be written as a file of this name; other formats than
+/// PNG, TIFF and JPEG hold no codes, and anything goes with them.
+///
+/// # Errors
+/// Where they cannot, or the extension is unknown.
+pub fn check_codes(path: &Path, bits: u32, tag: Tag) -> Result<()> {
+    match Format::of_output(path)? {
+        Format::Jpeg if bits != 8 => Err(only_eight()),
+        Format::Jpeg | Format::Tiff if tag != Tag::Srgb => Err(no_srgb()),
+        _ => Ok(()),
+    }
+}
+
+fn only_eight() -> Error {
+    Error::input("JPEG has 8 bits a channel").help("use .png or .tif for 16")
 }

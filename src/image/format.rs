@@ -5,7 +5,7 @@ use std::path::Path;
 
 use ::image::ImageFormat;
 
-use super::openexr;
+use super::{openexr, tiff};
 use crate::error::{Error, Result};
 
 /// A file format that can be written.
@@ -17,6 +17,8 @@ pub enum Format {
     Hdr,
     /// Portable float map.
     Pfm,
+    /// TIFF, 8 or 16 bits a channel, or float32.
+    Tiff,
     /// PNG, 8 or 16 bits a channel.
     Png,
     /// JPEG, 8 bits a channel.
@@ -27,12 +29,13 @@ impl Format {
     /// The format that the extension of `path` asks for.
     ///
     /// # Errors
-    /// For any extension but `.exr`, `.hdr`, `.pfm`, `.png`, `.jpg` and `.jpeg`, in whatever case.
+    /// For any extension but `.exr`, `.hdr`, `.pfm`, `.tif`, `.tiff`, `.png`, `.jpg` and `.jpeg`, in whatever case.
     pub fn of_output(path: &Path) -> Result<Self> {
         match extension(path).as_str() {
             "exr" => Ok(Self::Exr),
             "hdr" => Ok(Self::Hdr),
             "pfm" => Ok(Self::Pfm),
+            "tif" | "tiff" => Ok(Self::Tiff),
             "png" => Ok(Self::Png),
             "jpg" | "jpeg" => Ok(Self::Jpeg),
             other => {
@@ -42,7 +45,7 @@ impl Format {
                 } else {
                     format!("the image name {name} has the unknown extension .{other}")
                 };
-                Err(Error::input(message).help("use .exr, .hdr, .pfm, .png or .jpg"))
+                Err(Error::input(message).help("use .exr, .hdr, .pfm, .tif, .png or .jpg"))
             }
         }
     }
@@ -55,6 +58,7 @@ pub(super) enum Decoder {
     Hdr,
     Jpeg,
     Pfm,
+    Tiff,
     Raster(ImageFormat),
 }
 
@@ -74,6 +78,9 @@ impl Decoder {
                 return Ok(decoder);
             }
         }
+        if tiff::is_tiff(bytes) {
+            return Ok(Self::Tiff);
+        }
         if let [b'P', b'1'..=b'7', space, ..] = bytes
             && (space.is_ascii_whitespace() || *space == b'#')
         {
@@ -86,7 +93,7 @@ impl Decoder {
             return Err(Error::input("the file is empty"));
         }
         Err(Error::input("the file is no image of a known format")
-            .help("EXR, HDR, PFM, PNG, JPEG, BMP, TGA and PPM are known"))
+            .help("EXR, HDR, PFM, TIFF, PNG, JPEG, BMP, TGA and PPM are known"))
     }
 }
 

@@ -1,7 +1,7 @@
 //! Images: a strided buffer of named f32 channels with views, and files in and out. Reading takes EXR,
-//! HDR, PFM, PNG, JPEG, BMP, TGA and PPM and gives values as the file holds them, but for colours that a file says
-//! to be of other primaries, which become those of BT.709; writing takes linear values as EXR, HDR or PFM and ready
-//! codes as PNG or JPEG. Which curve lies between the two is the display layer's business.
+//! HDR, PFM, TIFF, PNG, JPEG, BMP, TGA and PPM and gives values as the file holds them, but for colours that a file says
+//! to be of other primaries, which become those of BT.709; writing takes linear values as EXR, HDR, PFM or TIFF and ready
+//! codes as PNG, TIFF or JPEG. Which curve lies between the two is the display layer's business.
 
 mod bands;
 mod buffer;
@@ -14,6 +14,7 @@ mod openexr;
 mod pfm;
 mod radiance;
 mod raster;
+mod tiff;
 mod view;
 pub mod vol;
 
@@ -25,7 +26,7 @@ use std::path::Path;
 
 pub use bands::{Band, bands};
 pub use buffer::Image;
-pub use codes::{Code, Codes, Layout, Tag, write_codes};
+pub use codes::{Code, Codes, Layout, Tag, check_codes, write_codes};
 pub use format::Format;
 pub use layers::sheet;
 pub use metadata::{MetaValue, Metadata, Window};
@@ -40,9 +41,9 @@ use format::Decoder;
 /// What the values of a picture mean.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Encoding {
-    /// Linear values (EXR, HDR, PFM).
+    /// Linear values (EXR, HDR, PFM, TIFF of floats).
     Linear,
-    /// Code values in [0, 1], still encoded by the sRGB curve (PNG, JPEG, BMP, TGA, PPM); opacity is linear.
+    /// Code values in [0, 1], still encoded by the sRGB curve (TIFF, PNG, JPEG, BMP, TGA, PPM); opacity is linear.
     Srgb,
 }
 
@@ -115,11 +116,12 @@ fn decode_by(decoder: Decoder, bytes: &[u8], account: &Account) -> Result<Pictur
         Decoder::Hdr => radiance::decode(bytes, account),
         Decoder::Jpeg => jpeg::decode(bytes, account),
         Decoder::Pfm => pfm::decode(bytes, account),
+        Decoder::Tiff => tiff::decode(bytes, account),
         Decoder::Raster(format) => raster::decode(bytes, format, account),
     }
 }
 
-/// Writes linear values as EXR (all channels, metadata), HDR or PFM (main colour), by the extension. The file
+/// Writes linear values as EXR (all channels, metadata), HDR, PFM (main colour) or TIFF (that and opacity), by the extension. The file
 /// appears whole or not at all.
 ///
 /// # Errors
@@ -148,6 +150,7 @@ pub fn write_window(
         Format::Exr => openexr::encode(image, window, metadata)?,
         Format::Hdr => radiance::encode(image)?,
         Format::Pfm => pfm::encode(image)?,
+        Format::Tiff => tiff::encode(image)?,
         Format::Png | Format::Jpeg => {
             return Err(Error::input(format!(
                 "linear values cannot be stored as {}",

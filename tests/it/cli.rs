@@ -421,6 +421,21 @@ fn convert_makes_the_pictures_that_render_makes_and_takes_layers_crops_and_sheet
     assert_eq!(read("b.png"), read("d.png"));
     place.run("convert a.exr -o e.pfm").ends_with(0);
     assert_eq!(read("e.pfm").pixel(3, 2), &read("a.exr").pixel(3, 2)[..3]);
+    place.run("convert a.exr -o e.tif --bits 32").ends_with(0);
+    assert_eq!(read("e.tif").pixel(3, 2), &read("a.exr").pixel(3, 2)[..3]);
+    for bits in ["", " --bits 16 --view agx"] {
+        for name in ["f.tif", "f.png"] {
+            let command = format!("convert a.exr -o {name}{bits}");
+            place.run(&command).ends_with(0);
+        }
+        assert_eq!(read("f.tif"), read("f.png"), "{bits}");
+        place
+            .run(&format!("render scene.xml -o g.tiff{bits}"))
+            .ends_with(0);
+        assert_eq!(read("g.tiff"), read("f.tif"), "{bits}");
+    }
+    place.run("convert f.tif -o h.png --bits 16").ends_with(0);
+    assert_eq!(read("h.png"), read("f.tif"));
 
     let (width, height) = (read("a.exr").width(), read("a.exr").height());
     let run = place.run("convert a.exr b.png -o pair.png --sheet 2 --json");
@@ -441,6 +456,22 @@ fn convert_makes_the_pictures_that_render_makes_and_takes_layers_crops_and_sheet
             "convert a.exr -o x.png --layer albedo",
             1,
             "no layer \"albedo\"",
+        ),
+        (
+            "convert a.exr -o x.png --bits 32",
+            1,
+            "PNG and JPEG have no floats",
+        ),
+        ("convert a.exr -o x.jpg --bits 16", 1, "JPEG has 8 bits"),
+        (
+            "convert a.exr -o x.tif --encode pq",
+            1,
+            "cannot say that their codes",
+        ),
+        (
+            "render scene.xml -o x.png --bits 32",
+            1,
+            "PNG and JPEG have no floats",
         ),
         (
             "convert a.exr -o x.png --crop 0,0,9999,1",

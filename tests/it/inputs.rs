@@ -510,15 +510,15 @@ const CASES: &[Case<'static>] = &[
     ),
     usage(
         "an unknown extension",
-        "-o image.tiff",
+        "-o image.webp",
         1,
-        &[".exr, .hdr, .pfm, .png or .jpg"],
+        &[".exr, .hdr, .pfm, .tif, .png or .jpg"],
     ),
     usage(
         "no extension",
         "-o image",
         1,
-        &[".exr, .hdr, .pfm, .png or .jpg"],
+        &[".exr, .hdr, .pfm, .tif, .png or .jpg"],
     ),
     usage(
         "an input that is not there",

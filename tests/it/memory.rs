@@ -115,6 +115,7 @@ fn files() -> Vec<(&'static str, Vec<u8>)> {
             "light.pfm",
             [&b"PF\n3000 1500\n-1\n"[..], &[0; 54_000_000]].concat(),
         ),
+        ("codes.tif", [&tiff(9000)[..], &[0; 100_000]].concat()),
         (
             "codes.ppm",
             [&b"P6\n9000 9000 255\n"[..], &[0; 100_000]].concat(),
@@ -150,6 +151,28 @@ fn files() -> Vec<(&'static str, Vec<u8>)> {
     ]
 }
 
+/// The beginning of a TIFF file of so many pixels a side, red, green and blue.
+fn tiff(side: u16) -> Vec<u8> {
+    let entries: [(u16, u16); 7] = [
+        (256, side),
+        (257, side),
+        (258, 8),
+        (262, 2),
+        (273, 8),
+        (277, 3),
+        (279, 60_000),
+    ];
+    let mut file = b"II*\0\x08\0\0\0".to_vec();
+    file.extend((entries.len() as u16).to_le_bytes());
+    for (tag, value) in entries {
+        file.extend(tag.to_le_bytes());
+        file.extend(*b"\x03\0\x01\0\0\0");
+        file.extend(u32::from(value).to_le_bytes());
+    }
+    file.extend([0; 4]);
+    file
+}
+
 #[test]
 fn every_reader_refuses_what_is_more_than_the_limit_before_it_takes_it() {
     let folder = tempfile::tempdir().unwrap();
@@ -157,7 +180,7 @@ fn every_reader_refuses_what_is_more_than_the_limit_before_it_takes_it() {
         let path = folder.path().join(name);
         fs::write(&path, &bytes).unwrap();
         drop(bytes);
-        let is_mesh = !["png", "jpg", "hdr", "pfm", "ppm"]
+        let is_mesh = !["png", "jpg", "hdr", "pfm", "tif", "ppm"]
             .iter()
             .any(|extension| name.ends_with(extension));
         let mut commands = vec![format!("info {name}")];

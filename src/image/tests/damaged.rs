@@ -19,10 +19,20 @@ fn valid_files() -> Vec<(&'static str, Vec<u8>)> {
         ("a.jpg", jpeg_bytes(false)),
         ("b.jpg", jpeg_bytes(true)),
         ("a.pfm", pfm_bytes(&sample(9, 5, &["R", "G", "B"]))),
+        ("a.tif", tiff_bytes(Layout::Rgba)),
+        ("b.tif", tiff::encode(&sample(9, 5, &["Y", "A"])).unwrap()),
+        ("c.tif", tiffs::Foreign::default().bytes()),
         ("a.ppm", raster_bytes(16, 6, rgb, ImageFormat::Pnm)),
         ("a.bmp", raster_bytes(16, 6, rgb, ImageFormat::Bmp)),
         ("a.tga", raster_bytes(16, 6, rgb, ImageFormat::Tga)),
     ]
+}
+
+/// The bytes of a TIFF file of 16 × 6 pixels of codes.
+fn tiff_bytes(layout: Layout) -> Vec<u8> {
+    let n = 16 * 6 * layout.channels();
+    let codes: Vec<u8> = (0..n).map(|i| (i * 37 % 251) as u8).collect();
+    tiff::encode_samples([16, 6], layout, &codes).unwrap()
 }
 
 fn try_decode(name: &str, bytes: &[u8]) -> Result<Picture> {
@@ -59,6 +69,16 @@ fn falsified_files_are_refused() {
     let png = raster_bytes(16, 6, rgb, ImageFormat::Png);
     let jpg = jpeg_bytes(false);
     let pfm = pfm_bytes(&sample(9, 5, &["R", "G", "B"]));
+    let tif = tiff_bytes(Layout::Rgb);
+    let wide = |width: u32| {
+        let entry = |width: u32| [&b"\0\x01\x04\0\x01\0\0\0"[..], &width.to_le_bytes()].concat();
+        replaced(&tif, &entry(16), &entry(width))
+    };
+    let of = |change: fn(&mut tiffs::Foreign)| {
+        let mut file = tiffs::Foreign::default();
+        change(&mut file);
+        file.bytes()
+    };
     let bmp = raster_bytes(16, 6, rgb, ImageFormat::Bmp);
     let tga = raster_bytes(16, 6, rgb, ImageFormat::Tga);
     let hdr = radiance::encode(&sample(16, 6, &["Y"])).unwrap();
@@ -248,6 +268,18 @@ fn falsified_files_are_refused() {
             "cannot hold",
         ),
         ("a.pfm", pfm[..pfm.len() - 1].to_vec(), "ends too early"),
+        ("a.tif", tif[..8].to_vec(), "ends too early"),
+        ("a.tif", tif[..3].to_vec(), "no image of a known"),
+        ("a.tif", wide(0), "invalid"),
+        ("a.tif", wide(1 << 30), "cannot hold 1073741824 × 6"),
+        ("a.tif", wide(17), ""),
+        ("a.tif", of(|f| f.photometric = 3), "Photometric"),
+        ("a.tif", of(|f| f.photometric = 5), "grey or RGB"),
+        ("a.tif", of(|f| f.bits = 32), "32 bits of this kind"),
+        ("a.tif", of(|f| f.format = 2), "8 bits of this kind"),
+        ("a.tif", of(|f| f.compression = 7), "compression"),
+        ("a.tif", of(|f| f.samples = 0), "zero"),
+        ("a.tif", of(|f| f.data.truncate(20)), "too early"),
         ("a.ppm", b"P6\n60000 60000\n255\n".to_vec(), "cannot hold"),
         ("a.ppm", b"P6\n4 4\n70000\n".to_vec(), "MAXVAL"),
         ("a.ppm", b"P6\n4 4\n0\n".to_vec(), "MAXVAL"),

@@ -7,6 +7,7 @@ mod colors;
 mod damaged;
 mod jpegs;
 mod round_trip;
+mod tiffs;
 
 /// An image whose samples all differ, brighter than a display too.
 fn sample(width: u32, height: u32, names: &[&str]) -> Image {

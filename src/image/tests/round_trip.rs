@@ -334,7 +334,7 @@ fn what_cannot_be_written_is_known_before_the_render() {
     let folder = tempfile::tempdir().unwrap();
     for (name, message) in [
         ("a", "has no extension"),
-        ("a.tiff", "use .exr, .hdr, .pfm, .png or .jpg"),
+        ("a.webp", "use .exr, .hdr, .pfm, .tif, .png or .jpg"),
     ] {
         let path = folder.path().join(name);
         let error = check_writable(&path).unwrap_err();
