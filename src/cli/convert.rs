@@ -99,6 +99,7 @@ fn outputs(arguments: &Arguments) -> Result<Vec<PathBuf>> {
             input,
             frame: 0,
             sensor: "0",
+            eye: None,
         };
         names.expand(&arguments.output)
     };

@@ -12,6 +12,7 @@ use super::output::Names;
 use super::overrides::{self, Chosen, Sensors};
 use super::parse::Frames;
 use super::scene::SceneArguments;
+use super::stereo::Eye;
 
 /// One image.
 #[derive(Clone, Debug)]
@@ -20,6 +21,8 @@ pub(super) struct Item {
     pub(super) frame: Option<i64>,
     /// In file order from 0.
     pub(super) sensor: usize,
+    /// Where there are two looks.
+    pub(super) eye: Option<Eye>,
     pub(super) output: PathBuf,
     /// Where the picture of its node steps goes.
     pub(super) heatmap: Option<PathBuf>,
@@ -50,6 +53,9 @@ impl Item {
         if self.sensor > 0 {
             name += &format!(", sensor {}", self.sensor);
         }
+        if let Some(eye) = self.eye {
+            name += &format!(", {} eye", eye.name());
+        }
         name
     }
 }
@@ -69,6 +75,8 @@ pub(super) struct Request<'a> {
     pub(super) frames: Option<Frames>,
     /// The first sensor where absent.
     pub(super) sensors: Option<&'a Sensors>,
+    /// None for one look.
+    pub(super) eyes: &'a [Eye],
     pub(super) output: &'a str,
     pub(super) heatmap: Option<&'a str>,
     pub(super) scene: &'a SceneArguments,
@@ -105,11 +113,12 @@ fn files(inputs: &[PathBuf]) -> Result<Vec<PathBuf>> {
     Ok(all)
 }
 
-/// Where images go: into a folder as pictures with the inputs' names.
-fn pattern(output: &str) -> Cow<'_, str> {
+/// Where images go: into a folder as pictures with the inputs' names, and the eyes' where there are several.
+fn pattern(output: &str, eyes: usize) -> Cow<'_, str> {
     if output.ends_with(['/', std::path::MAIN_SEPARATOR]) || Path::new(output).is_dir() {
         let folder = output.trim_end_matches(['/', std::path::MAIN_SEPARATOR]);
-        return format!("{folder}/{{name}}.png").into();
+        let eye = if eyes > 1 { "-{eye}" } else { "" };
+        return format!("{folder}/{{name}}{eye}.png").into();
     }
     output.into()
 }
@@ -118,7 +127,7 @@ impl Request<'_> {
     /// All images, by input, frame and sensor.
     pub(super) fn images(&self) -> Result<Images> {
         let mut images = Images::default();
-        let output = pattern(self.output);
+        let output = pattern(self.output, self.eyes.len());
         for input in &files(self.inputs)? {
             let chosen = match self.chosen(input) {
                 Ok(chosen) => chosen,
@@ -128,16 +137,18 @@ impl Request<'_> {
                 }
             };
             for frame in self.numbers() {
-                for sensor in &chosen {
+                for (sensor, eye) in chosen.iter().flat_map(|sensor| self.looks(sensor)) {
                     let names = Names {
                         input,
                         frame: frame.unwrap_or(0),
                         sensor: &sensor.name,
+                        eye: eye.map(Eye::name),
                     };
                     images.items.push(Item {
                         input: input.clone(),
                         frame,
                         sensor: sensor.number,
+                        eye,
                         output: names.expand(&output)?,
                         heatmap: self.heatmap.map(|path| names.expand(path)).transpose()?,
                     });
@@ -145,6 +156,14 @@ impl Request<'_> {
             }
         }
         Ok(images)
+    }
+
+    /// The looks through a sensor.
+    fn looks<'s>(&self, sensor: &'s Chosen) -> Vec<(&'s Chosen, Option<Eye>)> {
+        match self.eyes {
+            [] => vec![(sensor, None)],
+            eyes => eyes.iter().map(|eye| (sensor, Some(*eye))).collect(),
+        }
     }
 
     fn numbers(&self) -> Vec<Option<i64>> {

@@ -37,6 +37,7 @@ mod report;
 mod scene;
 mod staging;
 mod status;
+mod stereo;
 mod stop;
 mod summary;
 mod turntable;

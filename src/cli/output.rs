@@ -18,9 +18,12 @@ pub(super) struct Names<'a> {
     pub(super) frame: i64,
     /// `{sensor}`: the sensor's id, or its number.
     pub(super) sensor: &'a str,
+    /// `{eye}`, where there are two.
+    pub(super) eye: Option<&'a str>,
 }
 
-const PLACEHOLDERS: &str = "there are {name}, {frame}, {frame:04} and {sensor}";
+const PLACEHOLDERS: &str =
+    "there are {name}, {frame}, {frame:04}, {sensor} and, with --stereo, {eye}";
 
 impl Names<'_> {
     /// The output file that `pattern` means. Braces around anything but a word stay as they are.
@@ -52,6 +55,7 @@ impl Names<'_> {
             "name" => Some(stem.to_string_lossy().into_owned()),
             // An id may hold anything, a file's name may not.
             "sensor" => Some(self.sensor.replace(['/', '\\'], "_")),
+            "eye" => self.eye.map(str::to_owned),
             other => frame(other, self.frame),
         }
     }
@@ -191,6 +195,7 @@ mod tests {
             input: Path::new("scenes/box.xml"),
             frame: 7,
             sensor: "front/left",
+            eye: Some("left"),
         }
     }
 
@@ -200,6 +205,7 @@ mod tests {
             ("out/{name}.exr", "out/box.exr"),
             ("{name}-{frame:04}-{frame}.png", "box-0007-7.png"),
             ("{sensor}.png", "front_left.png"),
+            ("{name}.{eye}.png", "box.left.png"),
             ("a{}b{ c}.png", "a{}b{ c}.png"),
             ("{{name}}.png", "{box}.png"),
             ("open{.png", "open{.png"),
@@ -218,6 +224,12 @@ mod tests {
             let error = names().expand(pattern).unwrap_err().to_string();
             assert!(error.contains("{frame:04}"), "{pattern}: {error}");
         }
+        let one = Names {
+            eye: None,
+            ..names()
+        };
+        let error = one.expand("{eye}.png").unwrap_err().to_string();
+        assert!(error.contains("with --stereo"), "{error}");
     }
 
     #[test]

@@ -28,6 +28,7 @@ use super::parse::{self, Frames};
 use super::progress::{self, Told, Watch};
 use super::scene::SceneArguments;
 use super::staging::StagingArguments;
+use super::stereo::Eye;
 use super::stop::Stop;
 use super::summary::{self, Ending, Style};
 use super::turntable::{self, Orbit};
@@ -48,7 +49,7 @@ pub(super) struct Arguments {
     #[arg(required = true, value_name = "INPUT")]
     inputs: Vec<PathBuf>,
     /// Where the image goes; a folder is OUT/{name}.png. {name} stands for the input's name, {frame} or {frame:04} for the frame's
-    /// number, {sensor} for the sensor's id or number
+    /// number, {sensor} for the sensor's id or number, {eye} for left or right
     #[arg(short, long, value_name = "OUT")]
     output: String,
     #[command(flatten)]
@@ -87,6 +88,14 @@ pub(super) struct Arguments {
     /// or the scene's centre)
     #[arg(long, value_name = "X,Y,Z", value_parser = parse::point, allow_hyphen_values = true, requires = "turntable", help_heading = SERIES)]
     pivot: Option<DVec3>,
+    /// Look at the scene with two eyes that are so far apart, in units of the scene: two images, of which {eye} in OUT says
+    /// which. The camera is moved by half of that to the left and to the right along its own horizontal axis, and both eyes
+    /// look the same way: their axes are parallel
+    #[arg(long, value_name = "IOD", value_parser = parse::positive, help_heading = SERIES)]
+    stereo: Option<f64>,
+    /// Only what this eye sees
+    #[arg(long, value_enum, value_name = "left|right", requires = "stereo", help_heading = SERIES)]
+    eye: Option<Eye>,
     /// Leave out images whose file is there, unless a checkpoint lies beside it
     #[arg(long, help_heading = SERIES)]
     skip_existing: bool,
@@ -160,6 +169,7 @@ Examples:
   etendue render meshes/ -o out/
   etendue render scene.xml -o crop.exr --crop 100,80,64,64 --max-depth 2 -D spp=16
   etendue render dragon.ply -o out/{frame:03}.png --turntable 36
+  etendue render room.xml -o room-{eye}.exr --stereo 0.065
   etendue render walk.xml -o out/{frame:04}.exr --frames 0:240 -D body=body-{frame:04}.ply
   etendue render room.xml -o room.exr --noise-threshold 0.01 --sampler sobol
   etendue render big.xml -o big.exr --checkpoint 300 --resume
@@ -294,6 +304,11 @@ impl Arguments {
             inputs: &self.inputs,
             frames: self.frames.or(self.turntable.map(Frames::first)),
             sensors: self.image.sensors(),
+            eyes: match (self.stereo, &self.eye) {
+                (None, _) => &[],
+                (Some(_), None) => &[Eye::Left, Eye::Right],
+                (Some(_), Some(eye)) => std::slice::from_ref(eye),
+            },
             output: &self.output,
             heatmap: self.heatmap.as_deref(),
             scene: &self.scene,
@@ -311,7 +326,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     let budget = arguments.run.memory.budget_until(&stop);
     let Images { items, failed } = arguments.images(&budget)?;
     let files = (items.iter()).flat_map(|i| i.files().map(|file| (file, i.name())));
-    let help = "give each an output of its own, such as -o out/{name}-{frame:04}-{sensor}.exr";
+    let help = match arguments.stereo {
+        Some(_) => {
+            "give each an output of its own, such as -o out/{name}-{frame:04}-{sensor}-{eye}.exr"
+        }
+        None => "give each an output of its own, such as -o out/{name}-{frame:04}-{sensor}.exr",
+    };
     output::check_distinct(files, help)?;
     let wanted = items.iter().filter(|item| !arguments.skips(item));
     output::check_writable(wanted.flat_map(Item::files))?;
@@ -493,7 +513,8 @@ impl<'a> Series<'a> {
         seen
     }
 
-    /// The description at the item's time and from where the turntable has turned the camera, where that is another.
+    /// The description at the item's time and from where the turntable has turned the camera and the eye is, where that
+    /// is another.
     fn pose(
         &mut self,
         item: &Item,
@@ -528,6 +549,12 @@ impl<'a> Series<'a> {
             };
             let posed = posed.get_or_insert_with(|| description.clone());
             orbit.place(posed, sensor);
+        }
+        let sensor = sensors(description).get(item.sensor).copied();
+        if let (Some(distance), Some(eye), Some(sensor)) = (self.arguments.stereo, item.eye, sensor)
+        {
+            let posed = posed.get_or_insert_with(|| description.clone());
+            eye.place(posed, sensor, distance)?;
         }
         if let Some(times) = self.moments(item, shutter)? {
             let posed = posed.get_or_insert_with(|| description.clone());

@@ -247,6 +247,103 @@ fn a_turntable_loads_its_scene_once_and_comes_around() {
     assert_eq!(pixels("u4.exr"), pixels("t1.exr"));
 }
 
+/// Two squares of light at depths of 4 and 8, the nearer one above, seen by a camera whose focal length is 64 pixels.
+const DEPTHS: &str = r#"<scene version="3.0.0">
+    <integrator type="path"><integer name="max_depth" value="1"/></integrator>
+    <sensor type="perspective">
+        <float name="fov" value="90"/>
+        <transform name="to_world"><lookat origin="1, 2, 3" target="1, 2, 0" up="0, 1, 0"/></transform>
+        <film type="hdrfilm"><integer name="width" value="128"/><integer name="height" value="64"/>
+            <rfilter type="box"/></film>
+        <sampler type="independent"><integer name="sample_count" value="64"/></sampler>
+    </sensor>
+    <shape type="rectangle">
+        <transform name="to_world"><scale value="0.3"/><translate x="1.2" y="2.8" z="-1"/></transform>
+        <emitter type="area"><rgb name="radiance" value="1"/></emitter>
+    </shape>
+    <shape type="rectangle">
+        <transform name="to_world"><scale value="0.3"/><translate x="1.2" y="0.4" z="-5"/></transform>
+        <emitter type="area"><rgb name="radiance" value="1"/></emitter>
+    </shape>
+</scene>"#;
+
+#[test]
+fn two_eyes_see_what_is_near_further_apart_as_a_pinhole_has_it() {
+    let place = Place::new();
+    fs::write(place.path("depths.xml"), DEPTHS).unwrap();
+    let run = place.run("render depths.xml -o d-{eye}.exr --stereo 0.5 --json");
+    let told = run.ends_with(0).objects();
+    assert_eq!(told[0]["output"], "d-left.exr");
+    assert_eq!(told[1]["output"], "d-right.exr");
+    assert_eq!(told[1]["seconds"]["load"], 0.0, "one scene for both");
+    let read = |name: &str| {
+        let path = place.path(name);
+        etendue::image::read(&path, &Default::default())
+            .unwrap()
+            .image
+    };
+    // The column and row of the light's centre within these rows.
+    let center = |name: &str, rows: std::ops::Range<u32>| {
+        let image = read(name);
+        let mut sums = [0.0; 3];
+        for (y, x) in rows.flat_map(|y| (0..128).map(move |x| (y, x))) {
+            let light = f64::from(image.get(x, y, 0));
+            let place = [f64::from(x) + 0.5, f64::from(y) + 0.5];
+            sums[0] += light * place[0];
+            sums[1] += light * place[1];
+            sums[2] += light;
+        }
+        [sums[0] / sums[2], sums[1] / sums[2]]
+    };
+    for (rows, depth) in [(0..32, 4.0), (32..64, 8.0)] {
+        let [left, right] = ["d-left.exr", "d-right.exr"].map(|eye| center(eye, rows.clone()));
+        let disparity = left[0] - right[0];
+        let formula = 64.0 * 0.5 / depth;
+        assert!(
+            (disparity - formula).abs() < 0.05,
+            "{depth}: {disparity}, not {formula}"
+        );
+        // Half of it to each side of where one eye sees it.
+        let one = 64.0 + 64.0 * 0.2 / depth;
+        assert!(
+            (left[0] + right[0] - 2.0 * one).abs() < 0.1,
+            "{left:?} {right:?}"
+        );
+        assert!((left[1] - right[1]).abs() < 0.05, "{left:?} {right:?}");
+    }
+    let bytes = |name: &str| place.bytes(name);
+    place
+        .run("render depths.xml -o one.exr --stereo 0.5 --eye right -q")
+        .ends_with(0);
+    assert!(read("one.exr") == read("d-right.exr"));
+    place
+        .run("render depths.xml -o both/ --stereo 0.5 --spp 1 -q")
+        .ends_with(0);
+    assert_ne!(
+        bytes("both/depths-left.png"),
+        bytes("both/depths-right.png")
+    );
+    place
+        .run("render mesh.ply -o t{frame}-{eye}.png --stereo 0.1 --turntable 2 --size 24x16 --spp 1 -q")
+        .ends_with(0);
+    assert_ne!(bytes("t1-left.png"), bytes("t1-right.png"));
+    for (arguments, message) in [
+        (
+            "depths.xml -o a.exr --stereo 0.5",
+            "depths.xml, left eye and depths.xml, right eye would both",
+        ),
+        ("depths.xml -o {eye}.exr", "with --stereo, {eye}"),
+    ] {
+        let run = place.run(&format!("render {arguments}"));
+        run.ends_with(1);
+        assert!(
+            run.stderr().contains(message),
+            "{arguments}: {}",
+            run.stderr()
+        );
+    }
+}
+
 #[test]
 fn sensors_are_chosen_by_number_by_id_and_all_together() {
     let place = Place::new();

@@ -120,7 +120,8 @@ impl Manifest {
                 for item in items {
                     let mut arguments = vec!["render".to_owned(), scene.clone()];
                     let of_item = |option: &&String| {
-                        !option.starts_with("--frames=") && !option.starts_with("--sensor=")
+                        let of_one = ["--frames=", "--sensor=", "--eye="];
+                        !of_one.iter().any(|name| option.starts_with(name))
                     };
                     arguments.extend(options.iter().filter(of_item).cloned());
                     if let Some(frame) = item.frame {
@@ -128,6 +129,9 @@ impl Manifest {
                     }
                     if item.sensor > 0 {
                         arguments.push(format!("--sensor={}", item.sensor));
+                    }
+                    if let Some(eye) = item.eye {
+                        arguments.push(format!("--eye={}", eye.name()));
                     }
                     self.units.push(Unit {
                         arguments,
