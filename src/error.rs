@@ -258,7 +258,7 @@ impl Problems {
 }
 
 /// The candidate closest to `name` by edit distance (insertions, deletions, substitutions and swaps of
-/// neighbours), if at most a third of the name's letters differ.
+/// neighbours), if at most a third of the name's letters differ; one with which the name begins counts as close.
 fn closest_name<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     // A name longer than any plugin's or property's is no misspelling, and the table below is quadratic.
     const LONGEST: usize = 64;
@@ -269,7 +269,10 @@ fn closest_name<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -
     candidates
         .into_iter()
         .filter(|c| c.len() <= LONGEST)
-        .map(|c| (edit_distance(name, c), c))
+        .map(|c| match c.len() >= 4 && name.starts_with(c) {
+            true => (edit_distance(name, c).min(2), c),
+            false => (edit_distance(name, c), c),
+        })
         .filter(|&(distance, _)| distance <= allowed)
         .min_by_key(|&(distance, _)| distance)
         .map(|(_, c)| c)
@@ -310,6 +313,10 @@ mod tests {
         assert_eq!(closest_name("difuse", names), Some("diffuse"));
         assert_eq!(closest_name("dieletcric", names), Some("dielectric"));
         assert_eq!(closest_name("velvet", names), None);
+        assert_eq!(
+            closest_name("pathtracer", ["ptracer", "path"]),
+            Some("path")
+        );
         assert_eq!(closest_name(&"x".repeat(100_000), names), None);
     }
 

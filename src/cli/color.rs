@@ -11,7 +11,7 @@ use etendue::error::{Error, Location, Result};
 use etendue::image::{self, Metadata};
 
 use super::memory::MemoryArguments;
-use super::{output, parse, status};
+use super::{output, parse, report, status};
 
 /// Convert and compare colours, and draw them
 ///
@@ -41,7 +41,7 @@ enum Action {
     },
     /// How far apart two colours look: CIE 1976 and CIEDE2000
     Difference {
-        /// Three numbers
+        /// Three numbers, by default L*,a*,b*
         #[arg(value_parser = parse::color, allow_hyphen_values = true)]
         one: [f64; 3],
         /// Three numbers
@@ -107,6 +107,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
             output::line(&numbers(to.of_xyz(from.to_xyz(*color))));
         }
         Action::Difference { one, other, space } => {
+            if *space == Space::Lab
+                && let Some([lightness, ..]) = [one, other].into_iter().find(|lab| lab[0] > 100.0)
+            {
+                let message = format!("a lightness of {lightness}: in L*a*b* white has 100");
+                let warning = Error::input(message).help("--space says what the numbers are");
+                report::warnings(warning.problems());
+            }
             let [one, other] = [one, other].map(|color| Space::Lab.of_xyz(space.to_xyz(*color)));
             output::line(&format!("CIE 1976   {:.4}", color::delta_e_76(one, other)));
             output::line(&format!(

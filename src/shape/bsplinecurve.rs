@@ -260,7 +260,13 @@ impl BsplineCurves {
             width: 1.0,
             depth: 0,
         };
-        let mut end = f64::from(ray.t_max) * length;
+        let limit = f64::from(ray.t_max) * length;
+        if !whole.is_near(limit) {
+            return None;
+        }
+        // A place may be come to from another piece than its own, where control points are doubled. So no piece is left
+        // out for the ray's end: what is met first would depend on what was met before.
+        let mut end = f64::INFINITY;
         let mut best: Option<Crossing> = None;
         let mut pieces = [whole; DEEPEST as usize + 1];
         let mut count = 1;
@@ -304,6 +310,7 @@ impl BsplineCurves {
                 }
             }
         }
+        let best = best.filter(|met| met.z <= limit);
         best.map(|met| Crossing {
             z: met.z / length,
             u: met.u.clamp(0.0, 1.0),

@@ -421,6 +421,44 @@ fn a_ray_meets_a_tube_where_it_first_comes_within_the_radius() {
     }
 }
 
+/// What a ray meets on a segment is the same wherever the ray ends behind it, also where points are doubled and the curve
+/// has kinks: else it would depend on what was met before.
+#[test]
+fn the_ray_s_end_does_not_change_what_is_met_before_it() {
+    for (plugin, copies) in [("bsplinecurve", 1), ("bsplinecurve", 4), ("linearcurve", 2)] {
+        let mut met = 0;
+        for case in 0..60 {
+            let signed = |i| 2.0 * number(900 + case, i) - 1.0;
+            let points = (0..6)
+                .map(|i| 0.1 * DVec3::new(signed(4 * i), signed(4 * i + 1), signed(4 * i + 2)));
+            let points: Vec<DVec3> = points.collect();
+            let lines = points.iter().flat_map(|p| {
+                let line = format!("{} {} {} 0.04\n", p.x, p.y, p.z);
+                std::iter::repeat_n(line, copies)
+            });
+            let geometry = curves(plugin, &lines.collect::<String>(), "");
+            for i in 0..60 {
+                let eye = 0.5 * DVec3::new(signed(50 + i), signed(200 + i), signed(350 + i));
+                let aim = points[i as usize % 6]
+                    + 0.04 * DVec3::new(signed(500 + i), signed(650 + i), 0.0);
+                let whole = ray(eye, aim - eye);
+                for segment in 0..geometry.primitive_count() {
+                    let first = geometry.intersect(segment, &whole);
+                    met += u32::from(first.is_some());
+                    let t_max = 0.6 * number(77, 100 * case as u32 + i) as f32;
+                    let found = geometry.intersect(segment, &Ray { t_max, ..whole });
+                    assert_eq!(
+                        found,
+                        first.filter(|met| met.0 <= t_max),
+                        "{plugin} {copies}"
+                    );
+                }
+            }
+        }
+        assert!(met > 300, "{plugin} {copies}: {met}");
+    }
+}
+
 /// A place in [0, 1)², the `i`th of a sequence.
 fn pair(seed: u64, i: u32) -> Vec2 {
     Vec2::new(

@@ -812,6 +812,12 @@ const COMMANDS: &[(&str, i32, &str)] = &[
         1,
         "scene.xml --spp=1 and scene.xml --spp=2 would both be written to b.png",
     ),
+    ("batch scene.xml", 1, "this is XML, and a manifest is TOML"),
+    (
+        "color difference 255,0,0 250,0,0",
+        0,
+        "--space says what the numbers are",
+    ),
     ("batch none.toml", 1, "list of scenes is empty"),
     ("batch typo.toml", 1, "'--size'"),
     ("batch word.toml", 1, "whole number in digits"),

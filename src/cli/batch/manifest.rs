@@ -67,6 +67,11 @@ impl Manifest {
         let text = fs::read_to_string(path).map_err(|e| Error::system("read", path, &e))?;
         let line = |at: usize| 1 + text[..at.min(text.len())].matches('\n').count() as u32;
         let document: Document = toml::from_str(&text).map_err(|error| {
+            if text.trim_start().starts_with('<') {
+                let error = Error::input("this is XML, and a manifest is TOML");
+                let help = "etendue render takes scenes; etendue batch --help shows a manifest";
+                return error.at(&Location::of_file(path)).help(help);
+            }
             let at = error.span().map_or(0, |span| span.start);
             Error::input(error.message()).at(&Location::of_line(path, line(at)))
         })?;
