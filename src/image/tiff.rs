@@ -43,6 +43,8 @@ pub(super) fn decode(bytes: &[u8], account: &Account) -> Result<Picture> {
         .unwrap_or_default();
     let names = channel_names(colors, &extra)?;
     check_size([width, height], names.len(), MOST_PER_BYTE, bytes, account)?;
+    let samples = u64::from(width) * u64::from(height) * names.len() as u64;
+    check_length(&mut decoder, samples * u64::from(colors.bit_depth()) / 8)?;
     let mut limits = Limits::default();
     // The account has been asked for the pixels, and a compressed part is no longer than the file.
     limits.decoding_buffer_size = usize::MAX;
@@ -89,6 +91,30 @@ pub(super) fn decode(bytes: &[u8], account: &Account) -> Result<Picture> {
         metadata: Vec::new(),
         warnings,
     })
+}
+
+/// Refuses parts that are not compressed and shorter than their pixels: the decoder would read on in what follows them.
+fn check_length(decoder: &mut Decoder<Cursor<&[u8]>>, needed: u64) -> Result<()> {
+    const PLAIN: u16 = 1;
+    let method = decoder.find_tag_unsigned::<u16>(Tag::Compression);
+    if method
+        .map_err(refused)?
+        .is_some_and(|method| method != PLAIN)
+    {
+        return Ok(());
+    }
+    let mut there = 0;
+    for tag in [Tag::StripByteCounts, Tag::TileByteCounts] {
+        let lengths: Option<Vec<u64>> = decoder.find_tag_unsigned_vec(tag).map_err(refused)?;
+        there = lengths
+            .into_iter()
+            .flatten()
+            .fold(there, u64::saturating_add);
+    }
+    match there < needed {
+        true => Err(Error::input("the file ends too early")),
+        false => Ok(()),
+    }
 }
 
 /// Whether the first of the samples beyond the colours is this.

@@ -524,10 +524,12 @@ fn points_are_drawn_on_tubes_with_the_density_that_is_told() {
             if (f64::from(at.t) / way.length() - 1.0).abs() > 1e-4 {
                 continue;
             }
-            assert!(point.normal.dot(at.normal) > 0.999, "{plugin}");
+            // Where two segments meet in a crease, the ray may meet the other.
+            let same = at.primitive == point.primitive;
+            assert!(!same || point.normal.dot(at.normal) > 0.999, "{plugin}");
             let pdf = tubes.pdf(from.as_vec3(), &at);
             let cosine = -point.normal.as_dvec3().dot(way.normalize());
-            if cosine > 0.3 {
+            if cosine > 0.3 && same {
                 assert!(
                     (pdf / point.pdf - 1.0).abs() < 0.05,
                     "{plugin}: {pdf} {}",

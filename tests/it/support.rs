@@ -152,15 +152,18 @@ impl Mean {
     }
 }
 
-/// Lets programs that are started from here on hear Ctrl-C, also where these tests do not: a shell has what it starts in
-/// the background ignore it, and whoever ignores a signal hands that down. A handler is not handed down.
+/// Lets programs that are started from here on hear Ctrl-C and SIGHUP, also where these tests do not: a shell has what it
+/// starts in the background ignore the one, `nohup` the other, and whoever ignores a signal hands that down. A handler is
+/// not handed down.
 #[cfg(unix)]
 pub(crate) fn let_children_hear_interrupts() {
     use std::sync::Arc;
     use std::sync::atomic::AtomicBool;
 
-    use signal_hook::{consts::SIGINT, flag};
+    use signal_hook::{consts, flag};
 
-    let ends = Arc::new(AtomicBool::new(true));
-    flag::register_conditional_shutdown(SIGINT, 130, ends).expect("the system takes a handler");
+    for signal in [consts::SIGINT, consts::SIGHUP] {
+        let ends = Arc::new(AtomicBool::new(true));
+        flag::register_conditional_shutdown(signal, 130, ends).expect("the system takes a handler");
+    }
 }

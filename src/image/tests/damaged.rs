@@ -274,8 +274,15 @@ fn falsified_files_are_refused() {
         ("a.tif", wide(1 << 30), "cannot hold 1073741824 × 6"),
         ("a.tif", wide(17), ""),
         ("a.tif", of(|f| f.photometric = 3), "Photometric"),
-        ("a.tif", of(|f| f.photometric = 5), "grey or RGB"),
-        ("a.tif", of(|f| f.bits = 32), "32 bits of this kind"),
+        ("a.tif", of(|f| f.photometric = 5), "CMYK"),
+        (
+            "a.tif",
+            of(|f| {
+                f.bits = 32;
+                f.data.resize(96, 0);
+            }),
+            "32 bits of this kind",
+        ),
         ("a.tif", of(|f| f.format = 2), "8 bits of this kind"),
         ("a.tif", of(|f| f.compression = 7), "compression"),
         ("a.tif", of(|f| f.samples = 0), "zero"),
