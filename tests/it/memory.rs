@@ -264,6 +264,7 @@ fn memory_that_cannot_be_had_is_told_and_no_abort() {
 #[cfg(unix)]
 #[test]
 fn a_signal_ends_reading() {
+    crate::support::let_children_hear_interrupts();
     let folder = tempfile::tempdir().unwrap();
     let member = gzip(&[(&[b' '; 100], 1_000_000)]);
     let mut file = fs::File::create(folder.path().join("spaces.obj.gz")).unwrap();
