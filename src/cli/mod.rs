@@ -40,6 +40,7 @@ mod status;
 mod stereo;
 mod stop;
 mod summary;
+mod tev;
 mod turntable;
 mod verdicts;
 mod version;

@@ -137,6 +137,16 @@ pub(super) fn interval(text: &str) -> Parsed<std::time::Duration> {
     }
 }
 
+/// `127.0.0.1:14158`, `[::1]:14158`, `host:14158`
+pub(super) fn address(text: &str) -> Parsed<String> {
+    const HOW: &str = "write it as HOST:PORT, such as 127.0.0.1:14158";
+    let (host, port) = text.rsplit_once(':').ok_or(HOW)?;
+    match port.parse::<u16>() {
+        Ok(1..) if !host.is_empty() => Ok(text.to_owned()),
+        _ => Err(HOW.to_owned()),
+    }
+}
+
 /// A positive number.
 pub(super) fn positive(text: &str) -> Parsed<f64> {
     let number: f64 = text.parse().map_err(|_| "write a number such as 0.005")?;

@@ -18,7 +18,7 @@ use super::output;
 use super::stop::Stop;
 
 pub(super) use events::emit;
-pub(super) use steps::{Count, Steps, done, fail};
+pub(super) use steps::{Count, Steps, Voice, done, fail};
 
 /// How progress is told.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -118,8 +118,49 @@ struct Clock {
     shown: Instant,
 }
 
-/// Writes the image as it stands.
-pub(super) type Write<'a> = Box<dyn Fn(&Picture) + Sync + 'a>;
+/// Takes the image as it stands.
+pub(super) type Take<'a> = Box<dyn Fn(&Picture) + Sync + 'a>;
+
+/// Who takes the image as it stands.
+#[derive(Default)]
+pub(super) struct Takers<'a> {
+    /// Writes it, every so often and where a signal asks for it.
+    pub(super) write: Option<Take<'a>>,
+    /// The time between two that are written; without it only the signal asks.
+    pub(super) every: Option<Duration>,
+    /// Shows it, as often as that takes little of the time.
+    pub(super) show: Option<Take<'a>>,
+}
+
+/// When the image as it stands was last taken, and by whom it is to be taken next.
+#[derive(Debug)]
+struct Pictured {
+    written: Instant,
+    shown: Instant,
+    /// How long it took to make and show the last.
+    cost: Duration,
+    /// Since when the next is being made, where somebody asked for one.
+    asked: Option<Asked>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Asked {
+    since: Instant,
+    write: bool,
+    show: bool,
+}
+
+impl Pictured {
+    /// The shortest time between two that are shown.
+    const PAUSE: Duration = Duration::from_millis(250);
+    /// A picture takes one part of so many of the time.
+    const SHARE: u32 = 20;
+
+    /// Whether another is to be shown.
+    fn is_stale(&self) -> bool {
+        self.shown.elapsed() >= Self::PAUSE.max(Self::SHARE * self.cost)
+    }
+}
 
 /// Watches one render.
 pub(super) struct Watch<'a> {
@@ -132,21 +173,13 @@ pub(super) struct Watch<'a> {
     stop: Stop,
     /// Whether it was said that the render is coming to an end.
     said: AtomicBool,
-    /// The time between two pictures of the image as it stands, and when the last was made.
-    every: Option<Duration>,
-    pictured: Mutex<Instant>,
-    write: Write<'a>,
+    takers: Takers<'a>,
+    pictured: Mutex<Pictured>,
 }
 
 impl<'a> Watch<'a> {
-    /// For the render called `name`; `write` writes its image as it stands, every so often and where a signal asks for it.
-    pub(super) fn new(
-        name: &str,
-        told: Told,
-        stop: Stop,
-        every: Option<Duration>,
-        write: Write<'a>,
-    ) -> Self {
+    /// For the render called `name`.
+    pub(super) fn new(name: &str, told: Told, stop: Stop, takers: Takers<'a>) -> Self {
         let now = Instant::now();
         Self {
             show: Show::new(told),
@@ -162,9 +195,13 @@ impl<'a> Watch<'a> {
             }),
             stop,
             said: AtomicBool::new(false),
-            every,
-            pictured: Mutex::new(now),
-            write,
+            takers,
+            pictured: Mutex::new(Pictured {
+                written: now,
+                shown: now,
+                cost: Duration::ZERO,
+                asked: None,
+            }),
         }
     }
 
@@ -251,16 +288,38 @@ impl Progress for Watch<'_> {
     }
 
     fn wants_picture(&self) -> bool {
-        if self.stop.take_wish() {
-            return true;
-        }
-        let pictured = self.pictured.lock().expect(CALM);
-        self.every.is_some_and(|every| pictured.elapsed() >= every)
+        let wished = self.takers.write.is_some() && self.stop.take_wish();
+        let mut pictured = self.pictured.lock().expect(CALM);
+        let every = self.takers.every;
+        let due = every.is_some_and(|every| pictured.written.elapsed() >= every);
+        let asked = Asked {
+            since: Instant::now(),
+            write: wished || due,
+            show: self.takers.show.is_some() && pictured.is_stale(),
+        };
+        pictured.asked = (asked.write || asked.show).then_some(asked);
+        pictured.asked.is_some()
     }
 
     fn picture(&self, picture: &Picture) {
-        (self.write)(picture);
-        *self.pictured.lock().expect(CALM) = Instant::now();
+        // One that nobody asked for, by the z-buffer, is for all.
+        let unasked = Asked {
+            since: Instant::now(),
+            write: true,
+            show: true,
+        };
+        let asked = self.pictured.lock().expect(CALM).asked.take();
+        let asked = asked.unwrap_or(unasked);
+        if let Some(write) = self.takers.write.as_ref().filter(|_| asked.write) {
+            write(picture);
+            self.pictured.lock().expect(CALM).written = Instant::now();
+        }
+        if let Some(show) = self.takers.show.as_ref().filter(|_| asked.show) {
+            show(picture);
+            let mut pictured = self.pictured.lock().expect(CALM);
+            pictured.shown = Instant::now();
+            pictured.cost = asked.since.elapsed();
+        }
     }
 }
 
@@ -284,5 +343,20 @@ mod tests {
         assert_eq!(state.share(), 0.6);
         let begun = State { done: 500, ..state };
         assert_eq!(begun.left(), None);
+    }
+
+    #[test]
+    fn what_is_shown_takes_a_twentieth_of_the_time() {
+        let now = Instant::now();
+        let pictured = |milliseconds, cost| Pictured {
+            written: now,
+            shown: now - Duration::from_millis(milliseconds),
+            cost: Duration::from_millis(cost),
+            asked: None,
+        };
+        assert!(pictured(2100, 100).is_stale());
+        assert!(!pictured(1500, 100).is_stale());
+        assert!(!pictured(100, 0).is_stale());
+        assert!(pictured(300, 0).is_stale());
     }
 }

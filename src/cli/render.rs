@@ -25,12 +25,13 @@ use super::images::{Images, Item, Request};
 use super::memory::{RUN, RunArguments};
 use super::overrides::{IMAGE, ImageArguments};
 use super::parse::{self, Frames};
-use super::progress::{self, Told, Watch};
+use super::progress::{self, Take, Takers, Told, Voice, Watch};
 use super::scene::SceneArguments;
 use super::staging::StagingArguments;
 use super::stereo::Eye;
 use super::stop::Stop;
 use super::summary::{self, Ending, Style};
+use super::tev::Viewer;
 use super::turntable::{self, Orbit};
 use super::{output, report, status};
 
@@ -125,6 +126,10 @@ pub(super) struct Arguments {
     /// by maps and nothing blurred. The image as asked for takes its place when it is done
     #[arg(long, help_heading = RUN)]
     preview: bool,
+    /// Show each image while it is rendered in the viewer tev (https://github.com/Tom94/tev) that listens there, by itself at
+    /// 127.0.0.1:14158: linear and with all channels, under the name of its file
+    #[arg(long, value_name = "HOST:PORT", value_parser = parse::address, help_heading = RUN)]
+    tev: Option<String>,
     #[command(flatten)]
     run: RunArguments,
     /// How rays find shapes; the image is the same
@@ -174,6 +179,7 @@ Examples:
   etendue render room.xml -o room.exr --noise-threshold 0.01 --sampler sobol
   etendue render big.xml -o big.exr --checkpoint 300 --resume
   etendue render big.xml -o big.png --preview
+  etendue render big.xml -o big.exr --tev 127.0.0.1:14158
   etendue render terrain.ply -o terrain.png --cache ~/.cache/etendue
   etendue render dragon.ply -o dragon.png --stats --heatmap steps.png
   etendue render room.xml -o room.png --exposure auto --view agx
@@ -260,6 +266,7 @@ impl Arguments {
             (self.heatmap.is_some(), "--heatmap"),
             (self.snapshot.is_some(), "--snapshot"),
             (self.preview, "--preview"),
+            (self.tev.is_some(), "--tev"),
             (self.denoising.denoise, "--denoise"),
         ];
         let is_part = is_part(Path::new(&self.output));
@@ -286,6 +293,14 @@ impl Arguments {
             quiet: self.quiet,
             json: self.json,
             stats: self.stats,
+        }
+    }
+
+    /// How warnings are told.
+    fn voice(&self) -> Voice {
+        Voice {
+            told: self.told(),
+            quiet: self.quiet,
         }
     }
 
@@ -323,6 +338,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     arguments.check()?;
     let stop = Stop::on_signals()?;
     stop.hear_wishes()?;
+    let voice = arguments.voice();
+    let viewer = (arguments.tev.as_ref()).map(|address| Viewer::connect(address, voice));
+    let viewer = viewer.transpose()?;
     let budget = arguments.run.memory.budget_until(&stop);
     let Images { items, failed } = arguments.images(&budget)?;
     let files = (items.iter()).flat_map(|i| i.files().map(|file| (file, i.name())));
@@ -342,6 +360,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     let mut series = Series::new(arguments, budget, stop);
     let threads = arguments.run.threads.map_or(0, |threads| threads.get());
     series.denoiser = arguments.denoising.denoiser(threads)?;
+    series.viewer = viewer.as_ref();
     if let Some(option) = arguments.staging.given()
         && !items.iter().any(|item| is_mesh(&item.input))
     {
@@ -391,6 +410,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     );
     // The process ends: the system takes the scene back at once, faster than piece by piece.
     std::mem::forget(series);
+    if let Some(viewer) = viewer {
+        viewer.close();
+    }
     Ok(status)
 }
 
@@ -419,6 +441,8 @@ struct Series<'a> {
     stop: Stop,
     /// Found before anything is rendered, so that it is there in the end.
     denoiser: Option<Denoiser>,
+    /// Who looks on.
+    viewer: Option<&'a Viewer>,
 }
 
 /// What is known of an image before it is rendered.
@@ -444,8 +468,7 @@ pub(super) fn look(
     let outline = outline(&description, &options)?;
     let mut current = false;
     if item.output.exists() {
-        let nothing = Box::new(|_: &Picture| ());
-        let watch = Watch::new(&item.name(), Told::None, stop.clone(), None, nothing);
+        let watch = Watch::new(&item.name(), Told::None, stop.clone(), Takers::default());
         let posed = series.pose(item, &description, &options, &watch)?;
         let seen = posed.as_ref().unwrap_or(&description);
         let passes = arguments.passes.unwrap_or_default();
@@ -464,6 +487,7 @@ impl<'a> Series<'a> {
             told: Vec::new(),
             stop,
             denoiser: None,
+            viewer: None,
         }
     }
 
@@ -485,14 +509,15 @@ impl<'a> Series<'a> {
         );
         let read = self.read(item)?;
         let display = arguments.display.transform();
-        let write = Box::new(|picture: &Picture| snapshot(item, picture, &display));
-        let bar = Watch::new(
-            &item.name(),
-            arguments.told(),
-            stop,
-            arguments.snapshot,
-            write,
-        );
+        let name = item.output.display().to_string();
+        let takers = Takers {
+            write: Some(Box::new(|picture| snapshot(item, picture, &display))),
+            every: arguments.snapshot,
+            show: self.viewer.map(|viewer| -> Take<'_> {
+                Box::new(|picture| viewer.show(&name, &picture.image))
+            }),
+        };
+        let bar = Watch::new(&item.name(), arguments.told(), stop, takers);
         let posed = self.pose(item, &read.1, &options, &bar);
         let seen = posed.and_then(|posed| {
             let seen = posed.as_ref().unwrap_or(&read.1);
@@ -702,6 +727,9 @@ impl<'a> Series<'a> {
             image = denoise::applied(denoiser, &image)?;
             metadata = metadata.with("denoiser", denoise::name(denoiser));
         }
+        if let Some(viewer) = self.viewer {
+            viewer.finish(&item.output.display().to_string(), &image);
+        }
         let display = self.arguments.display.transform();
         display::save_window(&item.output, &image, &window, &metadata, &display)?;
         if let Some(provenance) = provenance {
@@ -732,25 +760,13 @@ impl<'a> Series<'a> {
         if self.told.contains(problem) {
             return;
         }
-        if self.arguments.told() == Told::Json {
-            self.problem("warning", problem);
-        } else if !self.arguments.quiet {
-            report::warnings(std::slice::from_ref(problem));
-        }
+        self.arguments.voice().warn_of(problem);
         self.told.push(problem.clone());
     }
 
     /// Says why an image is not there.
     fn fail(&self, error: &Error) {
         progress::fail(self.arguments.told(), error);
-    }
-
-    fn problem(&self, severity: &str, problem: &Problem) {
-        self.event("problem", || {
-            let mut object = report::object(problem);
-            object["severity"] = severity.into();
-            object
-        });
     }
 
     /// Says what happens to programs that want to hear it.

@@ -791,6 +791,8 @@ const COMMANDS: &[(&str, i32, &str)] = &[
         2,
         "0.01 seconds or more",
     ),
+    ("render a.ply -o b.png --tev localhost", 2, "HOST:PORT"),
+    ("render a.ply -o b.png --tev :70000", 2, "HOST:PORT"),
     ("render a.ply -o b.png --light moon", 2, "studio, sun, sky"),
     (
         "render scene.xml -o b.png --material metal",

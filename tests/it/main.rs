@@ -33,4 +33,5 @@ mod raster;
 mod resume;
 mod same_bits;
 mod signs;
+mod tev;
 mod tour;

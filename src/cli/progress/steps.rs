@@ -4,7 +4,7 @@ use std::io::IsTerminal;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-use etendue::error::Error;
+use etendue::error::{Error, Problem};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde_json::json;
 
@@ -133,9 +133,40 @@ pub(in super::super) fn fail(told: Told, error: &Error) {
         return report::error(error);
     }
     for problem in error.problems() {
-        let mut object = report::object(problem);
-        object["severity"] = "error".into();
-        events::emit("problem", object);
+        event("error", problem);
+    }
+}
+
+fn event(severity: &str, problem: &Problem) {
+    let mut object = report::object(problem);
+    object["severity"] = severity.into();
+    events::emit("problem", object);
+}
+
+/// How warnings are told.
+#[derive(Clone, Copy, Debug)]
+pub(in super::super) struct Voice {
+    /// How progress is.
+    pub(in super::super) told: Told,
+    /// Not at all, but to programs.
+    pub(in super::super) quiet: bool,
+}
+
+impl Voice {
+    /// Tells what to be warned of.
+    pub(in super::super) fn warn(self, error: &Error) {
+        for problem in error.problems() {
+            self.warn_of(problem);
+        }
+    }
+
+    /// Tells something to be warned of.
+    pub(in super::super) fn warn_of(self, problem: &Problem) {
+        match self.told {
+            Told::Json => event("warning", problem),
+            _ if self.quiet => {}
+            _ => report::warnings(std::slice::from_ref(problem)),
+        }
     }
 }
 
