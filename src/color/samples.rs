@@ -305,10 +305,11 @@ impl<F: Lanes, const N: usize> Call<F> for ToRows<'_, F, N> {
     }
 }
 
-/// Does an operation of `N` channels, where it stands or in a function.
+/// Does an operation of `N` channels, where it stands or in a function. With one lane the channels are what is in registers:
+/// short, and of the instructions of whoever asks.
 #[inline(always)]
 fn done<F: Lanes, T: Call<F>, const N: usize>(operation: T) -> T::Output {
-    if N <= EXPANDED {
+    if N <= EXPANDED || F::WIDTH == 1 {
         operation.run()
     } else {
         F::call(operation)

@@ -12,7 +12,7 @@ impl Lanes for f32 {
     type Mask = bool;
     type Double = f64;
 
-    #[inline(always)]
+    #[inline(never)]
     fn call<T: Call<Self>>(call: T) -> T::Output {
         call.run()
     }

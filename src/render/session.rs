@@ -23,7 +23,7 @@ use super::progress::Progress;
 use super::provenance::{self, Provenance};
 use super::uniform;
 use super::{Parted, Rendered, Report, rastered, timed};
-#[cfg(feature = "bands")]
+#[cfg(all(feature = "bands", not(test)))]
 use crate::color::{Bands, MAX_BANDS};
 use crate::color::{ColorModel, Comb, Response, Rgb};
 use crate::description::Description;
@@ -68,23 +68,21 @@ pub(super) trait Task: Sized {
 }
 
 /// Does a task in bands: the code is compiled for few numbers of them, and lanes beyond those asked for carry nothing.
-#[cfg(feature = "bands")]
+/// Unit tests render in RGB alone, for they would take twice as long to compile: `tests/it` renders in bands.
+#[cfg(all(feature = "bands", not(test)))]
 fn in_bands<T: Task>(task: T, comb: Comb, responses: Arc<[Response]>) -> Result<T::Output> {
     fn bands<const N: usize>(comb: Comb, responses: Arc<[Response]>) -> Bands<N> {
         Bands::new(comb, responses).expect("so many bands fit")
     }
     match comb.count() {
         ..=8 => task.run(bands::<8>(comb, responses)),
-        // In unit tests, which would take half as long again to compile, any number of lanes does.
-        #[cfg(not(test))]
         9..=16 => task.run(bands::<16>(comb, responses)),
-        #[cfg(not(test))]
         17..=32 => task.run(bands::<32>(comb, responses)),
         _ => task.run(bands::<MAX_BANDS>(comb, responses)),
     }
 }
 
-#[cfg(not(feature = "bands"))]
+#[cfg(not(all(feature = "bands", not(test))))]
 fn in_bands<T: Task>(_: T, _: Comb, _: Arc<[Response]>) -> Result<T::Output> {
     Err(Error::input(
         "this program was built without bands: build it with the feature `bands`, which is on by default",

@@ -238,13 +238,6 @@ fn a_checkpoint_of_another_render_is_refused_and_says_what_is_another() {
         ..options.clone()
     };
     assert!(refusal(&scene, &seed).contains("a setting"));
-    if cfg!(feature = "bands") {
-        let bands = Options {
-            colors: Colors::bands(3),
-            ..options.clone()
-        };
-        assert!(refusal(&scene, &bands).contains("a setting"));
-    }
     let other = place.scene(&SCENE.replace(
         "type='constant'/",
         "type='constant'><float name='radiance' value='2'/></emitter",

@@ -1,9 +1,13 @@
 //! Is light right that is rendered in bands: films of responses, ranges, boundaries that part wavelengths, and paints that
 //! are the same in one light?
 
+use std::num::NonZeroUsize;
+
+use etendue::budget::Budget;
 use etendue::color::{Comb, VISIBLE};
 use etendue::description::{Description, Options as ReadOptions};
 use etendue::image::Image;
+use etendue::profile::{self, Axis, Effort, Settings, Subject, Way};
 use etendue::render::{Colors, Options, Overrides, Silent, render};
 
 use super::support::{Mean, at, describe, film, path, rendered, scene};
@@ -286,4 +290,31 @@ fn a_metameric_pair_is_one_paint_in_daylight_and_two_under_lines() {
     }
     let (one, other) = (patch(5, 23), patch(23, 23));
     assert!(one[2] > 2.0 * other[2], "lines: {one:?} {other:?}");
+}
+
+#[test]
+fn bands_add_no_rays_to_a_profile() {
+    struct Patient;
+    impl profile::Watch for Patient {
+        fn at(&self, _: &str, _: f64) {}
+    }
+    let settings = Settings {
+        subject: Subject::Terrain,
+        axes: vec![Axis::Bands],
+        effort: Effort::Tiny,
+        threads: NonZeroUsize::new(2).unwrap(),
+        rounds: Some(1),
+        overrides: Overrides::default(),
+        sensor: None,
+        budget: Budget::default(),
+    };
+    let profile = profile::run(&settings, &Patient).unwrap().unwrap();
+    let points = &profile.series(Axis::Bands, Way::Tree).unwrap().points;
+    let rays: Vec<f64> = points.iter().map(|p| p.stats.rays() as f64).collect();
+    assert!(rays.len() > 1);
+    // Spectral paths draw other numbers.
+    assert!(
+        rays.iter().all(|r| (r / rays[0] - 1.0).abs() < 0.1),
+        "{rays:?}"
+    );
 }

@@ -194,14 +194,17 @@ fn a_time_limit_is_no_failure_and_can_be_continued() {
     let second = object(&output);
     let done = |told: &Value| told["completed"]["units"]["done"].as_u64().unwrap();
     assert!(done(&second) > done(&first));
-    let other = place.run(&[&limited[..], &["--resume", "--seed", "1"]].concat());
-    assert_eq!(other.status.code(), Some(1));
-    assert_eq!(object(&other)["status"], "failed");
-    let said = String::from_utf8_lossy(&other.stderr);
-    assert!(
-        said.contains("a setting (the seed, the bands or adaptive sampling) has changed"),
-        "{said}"
-    );
+    let bands = cfg!(feature = "bands").then_some(["--resume", "--bands", "3"]);
+    for other in [["--resume", "--seed", "1"]].into_iter().chain(bands) {
+        let refused = place.run(&[&limited[..], &other].concat());
+        assert_eq!(refused.status.code(), Some(1));
+        assert_eq!(object(&refused)["status"], "failed");
+        let said = String::from_utf8_lossy(&refused.stderr);
+        assert!(
+            said.contains("a setting (the seed, the bands or adaptive sampling) has changed"),
+            "{said}"
+        );
+    }
 }
 
 /// A scene of everything that is read from files, made in a folder, and for each of the files another content.
