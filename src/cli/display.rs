@@ -1,7 +1,9 @@
 //! Arguments on how linear values become codes for a screen.
 
 use clap::{Args, ValueEnum};
-use etendue::display::{Depth, DisplayTransform, Exposure, Gamut, Transfer, View};
+use etendue::display::{
+    Ambient, AmbientMode, Depth, DisplayTransform, Exposure, Gamut, Transfer, View,
+};
 
 use super::parse;
 
@@ -21,6 +23,20 @@ pub(super) struct DisplayArguments {
     /// The display's primaries
     #[arg(long, value_enum, default_value_t = Gamuts::Bt709, value_name = "NAME", help_heading = DISPLAY)]
     gamut: Gamuts,
+    /// The illuminance of the room that the display stands in, in lux: it sends LUX · reflectance / π back, or lets it
+    /// through where it is see-through, which is seen beside what it shows
+    #[arg(long, value_name = "LUX", value_parser = lux, help_heading = DISPLAY)]
+    ambient: Option<f32>,
+    /// What to do about that light
+    #[arg(long, value_enum, default_value_t = Modes::Compensate, value_name = "MODE", requires = "ambient", help_heading = DISPLAY)]
+    ambient_mode: Modes,
+    /// How much of that light the display sends back, 0 to 1; of a see-through one what it lets through times the reflectance
+    /// of what is behind
+    #[arg(long, default_value_t = Ambient::default().reflectance, value_name = "PART", value_parser = parse::part, requires = "ambient", help_heading = DISPLAY)]
+    ambient_reflectance: f32,
+    /// The luminance of the display's white in the dark, in cd/m²
+    #[arg(long, default_value_t = Ambient::default().white, value_name = "NITS", value_parser = nits, requires = "ambient", help_heading = DISPLAY)]
+    ambient_white: f32,
     /// The display's curve: "srgb", "gamma:2.2" or another exponent, "pq" or "hlg" (HDR, as a rule with --gamut
     /// bt2020 and --bits 16)
     #[arg(long, default_value = "srgb", value_name = "CURVE", value_parser = transfer, help_heading = DISPLAY)]
@@ -53,6 +69,15 @@ impl DisplayArguments {
                 Gamuts::P3 => Gamut::P3,
                 Gamuts::Bt2020 => Gamut::Bt2020,
             },
+            ambient: self.ambient.map(|illuminance| Ambient {
+                illuminance,
+                reflectance: self.ambient_reflectance,
+                white: self.ambient_white,
+                mode: match self.ambient_mode {
+                    Modes::Compensate => AmbientMode::Compensate,
+                    Modes::Simulate => AmbientMode::Simulate,
+                },
+            }),
             transfer: self.encode,
             depth: self.bits,
             dither: self.dither,
@@ -84,6 +109,31 @@ enum Gamuts {
     P3,
     /// ITU-R BT.2020
     Bt2020,
+}
+
+/// See [`AmbientMode`].
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Modes {
+    /// Show less, so that with that light the picture is seen as it was meant, where it is not darker than the light itself
+    Compensate,
+    /// Show what is seen in that light, for eyes that take the display's white for white
+    Simulate,
+}
+
+/// An illuminance.
+fn lux(text: &str) -> Result<f32, String> {
+    /// More than the sun's.
+    const MOST: f32 = 1e6;
+    let lux: Option<f32> = text.parse().ok();
+    let lux = lux.filter(|lux| (0.0..=MOST).contains(lux));
+    lux.ok_or_else(|| format!("write lux from 0 to {MOST}, such as 500 for an office"))
+}
+
+/// A display's luminance.
+fn nits(text: &str) -> Result<f32, String> {
+    let nits: Option<f32> = text.parse().ok();
+    let nits = nits.filter(|nits| (0.1..=1e6).contains(nits));
+    nits.ok_or_else(|| "write cd/m² from 0.1 to 1000000".to_owned())
 }
 
 /// A number of stops, or `auto`.

@@ -1,6 +1,6 @@
 //! From scene-referred to display-referred. A [`DisplayTransform`] makes linear values into codes for a screen: exposure,
-//! a view (how more light than a display has is compressed), glare, the display's primaries, its curve, and as many bits
-//! as it has. [`save`] is how renders leave: EXR, HDR and PFM stay linear, PNG and JPEG are encoded, and TIFF
+//! a view (how more light than a display has is compressed), glare, the display's primaries, the light of the room, its
+//! curve, and as many bits as it has. [`save`] is how renders leave: EXR, HDR and PFM stay linear, PNG and JPEG are encoded, and TIFF
 //! is either.
 
 pub mod diagram;
@@ -8,6 +8,7 @@ pub mod srgb;
 
 mod aces;
 mod agx;
+mod ambient;
 mod blur;
 mod dither;
 mod exposure;
@@ -26,6 +27,7 @@ use crate::color::Primaries;
 use crate::error::{Error, Result};
 use crate::image::{self, Code, Codes, Format, Image, Layout, Metadata, Tag, Window};
 
+pub use ambient::{Ambient, AmbientMode};
 pub use exposure::Exposure;
 pub use native::{chromaticities_of, gamut, native};
 pub use transfer::{Transfer, WHITE_NITS};
@@ -81,6 +83,8 @@ pub struct DisplayTransform {
     pub glare: f32,
     /// The display's primaries.
     pub gamut: Gamut,
+    /// The light of the room that it stands in; `None`: it is dark.
+    pub ambient: Option<Ambient>,
     /// Its curve.
     pub transfer: Transfer,
     /// Bits of a code.
@@ -96,6 +100,7 @@ impl Default for DisplayTransform {
             view: View::Standard,
             glare: 0.0,
             gamut: Gamut::Bt709,
+            ambient: None,
             transfer: Transfer::Srgb,
             depth: Depth::Eight,
             dither: false,
@@ -210,6 +215,9 @@ impl DisplayTransform {
             each(pixels, |rgb| {
                 (matrix * DVec3::from(rgb.map(f64::from))).as_vec3().into()
             });
+        }
+        if let Some(ambient) = &self.ambient {
+            each(pixels, |rgb| ambient.view(rgb));
         }
     }
 

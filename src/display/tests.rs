@@ -68,6 +68,29 @@ fn channels_decide_the_layout_and_opacity_has_no_curve() {
     assert!(DisplayTransform::default().codes::<u8>(&depths).is_err());
 }
 
+#[test]
+fn a_lit_room_lifts_black_and_leaves_white() {
+    let mut display = DisplayTransform {
+        ambient: Some(Ambient {
+            illuminance: 1000.0,
+            reflectance: 0.05,
+            white: 100.0,
+            mode: AmbientMode::Simulate,
+        }),
+        ..DisplayTransform::default()
+    };
+    // Black is 15.915 of 115.915 nits, 0.13730 of white, whose code is 104.
+    let seen = row(&display, &[[0.0; 3], [1.0; 3], [3.0; 3]]);
+    assert_eq!(seen, [[104; 3], [255; 3], [255; 3]]);
+    display.ambient = display.ambient.map(|ambient| Ambient {
+        mode: AmbientMode::Compensate,
+        ..ambient
+    });
+    let sent = row(&display, &[[0.1; 3], [0.5; 3], [1.0; 3]]);
+    // 1.159155 · 0.5 − 0.159155 = 0.420423, whose code is 173.
+    assert_eq!(sent, [[0; 3], [173; 3], [255; 3]]);
+}
+
 /// The short way of sRGB in 8 bits, and the way that all else takes; on a border either is right.
 #[test]
 fn codes_by_borders_are_those_of_the_curve() {

@@ -582,6 +582,12 @@ fn convert_makes_the_pictures_that_render_makes_and_takes_layers_crops_and_sheet
         ("convert a.exr -o x.jpg --encode pq", 1, "no sRGB"),
         ("convert a.exr -o x.png --encode gama:2", 2, "gamma:2.2"),
         ("convert a.exr -o x.png --glare 2", 2, "from 0 to 1"),
+        ("convert a.exr -o x.png --ambient -1", 2, "lux from 0"),
+        (
+            "convert a.exr -o x.png --ambient-white 80",
+            2,
+            "--ambient <LUX>",
+        ),
     ] {
         let run = place.run(arguments);
         assert!(
