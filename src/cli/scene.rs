@@ -17,6 +17,12 @@ const IMAGES: [&str; 12] = [
     "exr", "hdr", "pfm", "tif", "tiff", "png", "jpg", "jpeg", "bmp", "tga", "ppm", "pgm",
 ];
 
+/// Whether the file is an image, by its name.
+pub(super) fn is_image(input: &Path) -> bool {
+    let extension = input.extension().unwrap_or_default().to_ascii_lowercase();
+    IMAGES.iter().any(|image| extension == *image)
+}
+
 /// How scenes are read.
 #[derive(Args, Clone, Debug)]
 pub(super) struct ReadArguments {
@@ -124,9 +130,7 @@ impl SceneArguments {
             return Ok(());
         }
         let message = format!("{}: neither a scene nor a mesh", input.display());
-        let extension = input.extension().unwrap_or_default().to_ascii_lowercase();
-        let is_image = IMAGES.iter().any(|image| extension == *image);
-        Err(Error::input(message).help(if is_image {
+        Err(Error::input(message).help(if is_image(input) {
             "it is an image: `etendue info` tells what it holds, `etendue convert` makes another of it"
         } else {
             "a scene is an .xml file, a mesh a .ply, .obj, .stl, .serialized, .gltf or .glb"

@@ -2,11 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use etendue::render::{Background, Finish, Lighting, Staging, UpAxis};
 use glam::DVec3;
 
 use super::parse;
+use super::scene::{is_image, is_scene};
 
 /// How a bare mesh is shown.
 #[derive(Args, Clone, Debug)]
@@ -26,9 +27,10 @@ pub(super) struct StagingArguments {
     /// The point that the camera looks at, instead of the one that puts the mesh in the middle
     #[arg(long, value_name = "X,Y,Z", value_parser = parse::point, allow_hyphen_values = true, help_heading = BARE)]
     target: Option<DVec3>,
-    /// What the mesh is made of
-    #[arg(long, value_enum, default_value_t = Finishes::Clay, value_name = "NAME", help_heading = BARE)]
-    material: Finishes,
+    /// What the mesh is made of: "clay" (matte), "metal" (rough) or "plastic" (glossy) in the mesh's own colours where it has
+    /// any, "glass" (clear), the one material of a scene file (.xml), or matte with an image as its base colour
+    #[arg(long, default_value = "clay", value_name = "NAME|FILE", value_parser = material, help_heading = BARE)]
+    material: Finish,
     /// What lights it: "studio", "sun", "sky", or an image of all around by longitude and latitude
     #[arg(long, default_value = "studio", value_name = "NAME|IMAGE", value_parser = lighting, help_heading = BARE)]
     light: Lighting,
@@ -54,7 +56,7 @@ impl StagingArguments {
             (self.distance.is_some(), "--distance"),
             (self.fov.is_some(), "--fov"),
             (self.target.is_some(), "--target"),
-            (!matches!(self.material, Finishes::Clay), "--material"),
+            (self.material != Finish::Clay, "--material"),
             (!matches!(self.light, Lighting::Studio), "--light"),
             (!matches!(self.background, Background::Sky), "--background"),
             (self.no_ground, "--no-ground"),
@@ -79,12 +81,7 @@ impl StagingArguments {
                 width as f32 / height as f32
             }),
             all_around: turns,
-            finish: match self.material {
-                Finishes::Clay => Finish::Clay,
-                Finishes::Metal => Finish::Metal,
-                Finishes::Glass => Finish::Glass,
-                Finishes::Plastic => Finish::Plastic,
-            },
+            finish: self.material.clone(),
             lighting: self.light.clone(),
             background: self.background,
             ground: !self.no_ground,
@@ -103,17 +100,23 @@ fn lighting(text: &str) -> Result<Lighting, String> {
     }
 }
 
-/// See [`Finish`].
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum Finishes {
-    /// Matte, in the mesh's own colours where it has any
-    Clay,
-    /// Rough metal, in the mesh's own colours or aluminium
-    Metal,
-    /// Clear glass
-    Glass,
-    /// Glossy plastic, in the mesh's own colours where it has any
-    Plastic,
+/// What a mesh is made of.
+fn material(text: &str) -> Result<Finish, String> {
+    let path = Path::new(text);
+    match text {
+        "clay" => Ok(Finish::Clay),
+        "metal" => Ok(Finish::Metal),
+        "glass" => Ok(Finish::Glass),
+        "plastic" => Ok(Finish::Plastic),
+        _ if !path.is_file() => Err(
+            "write clay, metal, glass, plastic, or the name of a scene file \
+             or an image that is there"
+                .to_owned(),
+        ),
+        _ if is_scene(path) => Ok(Finish::File(path.to_owned())),
+        _ if is_image(path) => Ok(Finish::Picture(path.to_owned())),
+        _ => Err("a material's file is a scene (.xml) or an image".to_owned()),
+    }
 }
 
 /// An angle of at most so many degrees to either side.

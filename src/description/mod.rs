@@ -10,6 +10,7 @@ mod canonical;
 mod defines;
 mod element;
 mod encoding;
+mod graft;
 mod legacy;
 mod overrides;
 mod reader;
@@ -18,6 +19,7 @@ mod resolve;
 mod transform;
 mod upgrade;
 mod values;
+mod written;
 mod xml;
 
 #[cfg(test)]
@@ -33,6 +35,7 @@ pub use self::properties::Properties;
 use self::reader::Reader;
 use self::resolve::Scopes;
 pub use self::values::spectrum_file;
+pub use self::written::escaped;
 use crate::budget::Budget;
 use crate::error::{Location, Problem, Result};
 

@@ -214,6 +214,16 @@ impl Scopes {
         u32::try_from(self.0.len() - 1).expect("a file has far fewer than 2^32 includes")
     }
 
+    /// Adds all scopes of another file; the answer is by how much their numbers have grown.
+    pub(super) fn append(&mut self, other: &Self) -> u32 {
+        let grown = self.0.len() as u32;
+        self.0.extend(other.0.iter().map(|scope| Scope {
+            folders: scope.folders.clone(),
+            parent: scope.parent.map(|parent| parent + grown),
+        }));
+        grown
+    }
+
     /// Adds a folder, to be looked into before the others of the scope.
     pub(super) fn add(&mut self, scope: u32, folder: PathBuf) {
         self.0[scope as usize].folders.push(folder);

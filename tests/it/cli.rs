@@ -369,6 +369,70 @@ fn sensors_are_chosen_by_number_by_id_and_all_together() {
 }
 
 #[test]
+fn a_material_from_a_file_is_an_input_like_the_others() {
+    let place = Place::new();
+    fs::create_dir(place.path("look")).unwrap();
+    let material = r#"<scene version="3.0.0"><default name="rough" value="0.2"/>
+        <texture type="bitmap" id="t"><string name="filename" value="t.png"/></texture>
+        <bsdf type="twosided"><bsdf type="roughplastic"><float name="alpha" value="$rough"/>
+            <ref id="t" name="diffuse_reflectance"/></bsdf></bsdf></scene>"#;
+    let write = |text: &str| fs::write(place.path("look/m.xml"), text).unwrap();
+    write(material);
+    let paint = |seed: u32| {
+        let small = format!("render mesh.ply -o look/t.png --size 4x4 --spp 1 -q --seed {seed}");
+        place.run(&small).ends_with(0);
+    };
+    paint(1);
+    let of = "--size 16x12 --spp 4 -q -o a.exr --skip-same --json --material look/m.xml";
+    let render = || {
+        let run = place.run(&format!(
+            "render mesh.ply {of} --write-scene scene-of-mesh.xml"
+        ));
+        let objects = run.ends_with(0).objects();
+        let status = objects[0]["status"].as_str().unwrap().to_owned();
+        (status, place.bytes("a.exr"))
+    };
+    let (status, first) = render();
+    assert_eq!(status, "rendered");
+    assert_eq!(render(), ("skipped".to_owned(), first.clone()));
+
+    // The scene that was written says the same.
+    place
+        .run("render scene-of-mesh.xml --size 16x12 --spp 4 -q -o b.exr")
+        .ends_with(0);
+    let pixels = |name: &str| {
+        let picture = etendue::image::read(
+            &place.path(name),
+            &etendue::budget::Budget::default().open(),
+        );
+        picture.unwrap_or_else(|e| panic!("{e}")).image
+    };
+    assert_eq!(pixels("a.exr"), pixels("b.exr"));
+
+    // Neither the file nor what it names may become another unseen.
+    let mut last = first;
+    let changes: [&dyn Fn(); 2] = [&|| paint(2), &|| {
+        write(&material.replace(r#""0.2""#, r#""0.4""#))
+    }];
+    for change in changes {
+        change();
+        let (status, now) = render();
+        assert_eq!(status, "rendered");
+        assert_ne!(now, last);
+        last = now;
+    }
+
+    // What is wrong in it is shown where it stands.
+    write(&material.replace("\"alpha\"", "\"alhpa\""));
+    let run = place.run(&format!("render mesh.ply {of}"));
+    let said = run.ends_with(1).stderr();
+    assert!(
+        said.contains("look/m.xml:3") && said.contains("alhpa"),
+        "{said}"
+    );
+}
+
+#[test]
 fn a_failing_image_does_not_keep_the_others_from_being_made() {
     let place = Place::new();
     let run = place

@@ -793,6 +793,12 @@ const COMMANDS: &[(&str, i32, &str)] = &[
     ),
     ("render a.ply -o b.png --tev localhost", 2, "HOST:PORT"),
     ("render a.ply -o b.png --tev :70000", 2, "HOST:PORT"),
+    ("render a.ply -o b.png --material wood", 2, "clay, metal,"),
+    (
+        "render a.ply -o b.png --material nan.ply",
+        2,
+        "a scene (.xml) or an image",
+    ),
     ("render a.ply -o b.png --light moon", 2, "studio, sun, sky"),
     (
         "render scene.xml -o b.png --material metal",

@@ -10,14 +10,14 @@ use std::path::Path;
 use glam::{DMat4, DVec3, Vec3};
 
 use crate::budget::Budget;
-use crate::description::{Description, Options};
+use crate::description::{Description, Kind, Options, escaped};
 use crate::error::{Error, Location, Result};
 use crate::mesh::{
     Attribute, GltfCamera, Mesh, MeshFile, Projection, ReadMesh, ReadOptions, extension, read,
     read_gltf_camera,
 };
 use frame::FOV;
-use staging::{point, quoted};
+use staging::point;
 
 pub use staging::{Background, Finish, Lighting, Staging, UpAxis};
 
@@ -86,6 +86,16 @@ pub fn describe_mesh(
         let message = "none of the triangles has an area: there is nothing to see";
         return Err(Error::input(message).at(&Location::of_file(path)));
     }
+    if let Finish::Picture(picture) = &staging.finish
+        && loaded.mesh.uvs.is_empty()
+    {
+        let message = format!(
+            "the mesh has no texture coordinates, by which {} would be shown on it",
+            picture.display()
+        );
+        return Err(Error::input(message).at(&Location::of_file(path)));
+    }
+    let own = staging.own_material(options, budget)?;
     for message in unseen(&loaded.mesh) {
         let warning = Error::input(message).at(&Location::of_file(path));
         loaded.warnings.extend_from_slice(warning.problems());
@@ -101,11 +111,9 @@ pub fn describe_mesh(
         mesh: &loaded.mesh,
         staging,
     };
-    let text = scene(
-        &subject,
-        Path::new(path.file_name().unwrap_or_default()),
-        true,
-    );
+    let material = staging.material(|name| color(&loaded.mesh, name));
+    let name = Path::new(path.file_name().unwrap_or_default());
+    let text = scene(&subject, name, true, &material);
     let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
     // Only these formats' materials are colours.
     let colored = matches!(plugin, "obj" | "gltf");
@@ -115,13 +123,22 @@ pub fn describe_mesh(
             .attributes
             .iter()
             .any(|a| a.name == "face_color");
-    let written = scene(&subject, &absolute, bare);
+    let material = match &own {
+        Some((file, bsdf)) => file.written(*bsdf),
+        None => material,
+    };
+    let written = scene(&subject, &absolute, bare, &material);
     // What is written here is nobody's to be refused.
     let options = Options {
         strict: false,
         ..options.clone()
     };
-    let description = Description::parse(&text, path, &options)?.within(budget);
+    let mut description = Description::parse(&text, path, &options)?.within(budget);
+    if let Some((file, bsdf)) = &own {
+        let shapes = description.root().children(Kind::Shape);
+        let shape = shapes.last().expect("the mesh is the last").node_id();
+        description.graft(shape, file, *bsdf);
+    }
     let file = MeshFile {
         path: path.to_owned(),
         options: read_options,
@@ -203,8 +220,9 @@ fn color(mesh: &Mesh, name: &str) -> Option<String> {
     ))
 }
 
-/// The scene around the mesh that the shape reads from `file`, `bare` with its materials' colours.
-fn scene(subject: &Subject<'_>, file: &Path, bare: bool) -> String {
+/// The scene around the mesh that the shape reads from `file`, `bare` with its materials' colours, and that is made of
+/// `material`.
+fn scene(subject: &Subject<'_>, file: &Path, bare: bool, material: &str) -> String {
     let Subject {
         plugin,
         bounds: (min, max),
@@ -264,7 +282,7 @@ fn scene(subject: &Subject<'_>, file: &Path, bare: bool) -> String {
         } else {
             String::new()
         },
-        file = quoted(&file.to_string_lossy()),
+        file = escaped(&file.to_string_lossy()),
         // A glTF without normals is meant to be flat; other formats leave them to be computed.
         flat = plugin == "gltf" && mesh.normals.is_empty(),
         bare = if bare {
@@ -272,7 +290,6 @@ fn scene(subject: &Subject<'_>, file: &Path, bare: bool) -> String {
         } else {
             ""
         },
-        material = staging.material(|name| color(mesh, name)),
     )
 }
 
@@ -383,5 +400,61 @@ mod tests {
         assert!(textures().is_empty());
         std::fs::write(folder.path().join("red.mtl"), "newmtl red\nKd 1 0 0\n").unwrap();
         assert_eq!(textures(), ["mesh_attribute"]);
+    }
+
+    #[test]
+    fn a_material_comes_from_a_file_of_which_it_is_the_only_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        std::fs::write(at("a.ply"), PLY).unwrap();
+        let of = |text: &str| {
+            let text = format!(r#"<scene version="3.0.0">{text}</scene>"#);
+            std::fs::write(at("m.xml"), text).unwrap();
+            let staging = Staging {
+                finish: Finish::File(at("m.xml")),
+                ..Staging::default()
+            };
+            let options = Options::default();
+            describe_mesh(&at("a.ply"), &staging, &options, &Budget::default())
+        };
+        let one = r#"<bsdf type="plastic"><float name="int_ior" value="1.3"/></bsdf>"#;
+        let scene = of(&format!(r#"<shape type="sphere"/>{one}"#)).unwrap();
+        let material = |scene: &Description| {
+            let shape = *scene.root().children(Kind::Shape).last().unwrap();
+            let bsdf = shape.children(Kind::Bsdf)[0];
+            assert_eq!((bsdf.plugin(), bsdf.float("int_ior")), ("plastic", Ok(1.3)));
+        };
+        material(&scene.description);
+        assert!(scene.description.sources().contains(&at("m.xml")));
+        material(&Description::parse(&scene.text, &at("b.xml"), &Options::default()).unwrap());
+        for (text, told) in [
+            ("", "m.xml: there is no <bsdf> at the top"),
+            (
+                &format!("{one}\n{one}"),
+                "m.xml:2:1: the file has 2 <bsdf>s",
+            ),
+            ("<bsdf/>", "m.xml:1"),
+        ] {
+            let error = of(text).unwrap_err().to_string();
+            assert!(error.contains(told), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_picture_needs_texture_coordinates() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.obj");
+        let staging = Staging {
+            finish: Finish::Picture("wood.png".into()),
+            ..Staging::default()
+        };
+        let of = |text: &str| {
+            std::fs::write(&path, text).unwrap();
+            describe_mesh(&path, &staging, &Options::default(), &Budget::default())
+        };
+        let error = of("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap_err();
+        assert!(error.to_string().contains("wood.png"), "{error}");
+        let with = of("v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n");
+        assert!(with.unwrap().text.contains("wood.png"));
     }
 }

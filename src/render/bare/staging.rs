@@ -4,6 +4,10 @@ use std::path::PathBuf;
 
 use glam::{DVec3, Vec3};
 
+use crate::budget::Budget;
+use crate::description::{Description, Kind, NodeId, Options, escaped};
+use crate::error::{Error, Location, Result};
+
 /// Which way is up in a mesh file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum UpAxis {
@@ -33,7 +37,7 @@ impl UpAxis {
 }
 
 /// What a bare mesh is made of.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Finish {
     /// Matte, in its own colours or those of clay.
     #[default]
@@ -44,6 +48,10 @@ pub enum Finish {
     Glass,
     /// Glossy plastic in its own colours or those of clay.
     Plastic,
+    /// The material of this scene file, the only one at its top.
+    File(PathBuf),
+    /// Matte, in the colours of this image by the mesh's texture coordinates.
+    Picture(PathBuf),
 }
 
 /// What lights a bare mesh.
@@ -132,15 +140,57 @@ impl Staging {
         self.ground && self.background != Background::Transparent
     }
 
+    /// The scene file of the mesh's material, and that material, where it comes from a file. `options` and `budget` are for
+    /// reading it.
+    ///
+    /// # Errors
+    /// As [`Description::read`], and unless there is one material at its top.
+    pub(super) fn own_material(
+        &self,
+        options: &Options,
+        budget: &Budget,
+    ) -> Result<Option<(Description, NodeId)>> {
+        let Finish::File(path) = &self.finish else {
+            return Ok(None);
+        };
+        let options = Options {
+            strict: options.strict,
+            ..Options::default()
+        };
+        let file = Description::read(path, &options, budget)?;
+        let materials = file.root().children(Kind::Bsdf);
+        let wrong = match materials[..] {
+            [only] => {
+                let id = only.node_id();
+                return Ok(Some((file, id)));
+            }
+            [] => Error::input("there is no <bsdf> at the top of the file"),
+            [_, second, ..] => {
+                let message = format!("the file has {} <bsdf>s at its top", materials.len());
+                Error::input(message).at(second.location())
+            }
+        };
+        Err(wrong
+            .at(&Location::of_file(path))
+            .help("a material's file is a scene with one <bsdf>, in which others may be nested"))
+    }
+
     /// The mesh's material, around its colour, a `<rgb>` or `<texture>` of this name that `color` makes; `None` of a mesh
-    /// without colours of its own.
+    /// without colours of its own. Nothing where it comes from a file.
     pub(super) fn material(&self, color: impl Fn(&str) -> Option<String>) -> String {
+        let picture = |path: &PathBuf| {
+            let path = std::path::absolute(path).unwrap_or_else(|_| path.clone());
+            let path = escaped(&path.to_string_lossy());
+            format!(
+                r#"<texture name="reflectance" type="bitmap"><string name="filename" value="{path}"/></texture>"#
+            )
+        };
         let clay = |name: &str| {
             let [r, g, b] = crate::mesh::BARE_COLOR;
             color(name).unwrap_or_else(|| format!(r#"<rgb name="{name}" value="{r}, {g}, {b}"/>"#))
         };
         let twosided = |inside: String| format!(r#"<bsdf type="twosided">{inside}</bsdf>"#);
-        match self.finish {
+        match &self.finish {
             Finish::Clay => {
                 let reflectance = clay("reflectance");
                 twosided(format!(r#"<bsdf type="diffuse">{reflectance}</bsdf>"#))
@@ -161,6 +211,11 @@ impl Staging {
                 ))
             }
             Finish::Glass => r#"<bsdf type="dielectric"/>"#.to_owned(),
+            Finish::Picture(path) => {
+                let reflectance = picture(path);
+                twosided(format!(r#"<bsdf type="diffuse">{reflectance}</bsdf>"#))
+            }
+            Finish::File(_) => String::new(),
         }
     }
 
@@ -203,7 +258,7 @@ impl Staging {
             Lighting::Sky => sky([0.9, 0.95, 1.0]),
             Lighting::Environment(path) => {
                 let path = std::path::absolute(path).unwrap_or_else(|_| path.clone());
-                let path = quoted(&path.to_string_lossy());
+                let path = escaped(&path.to_string_lossy());
                 // Images of all around have y up.
                 let turn = match self.up {
                     UpAxis::Y => "",
@@ -222,10 +277,4 @@ impl Staging {
 /// A point as a scene file has it.
 pub(super) fn point(p: Vec3) -> String {
     format!("{}, {}, {}", p.x, p.y, p.z)
-}
-
-/// A text as an attribute has it, without parameters.
-pub(super) fn quoted(text: &str) -> String {
-    let text = text.replace('&', "&amp;").replace('"', "&quot;");
-    text.replace('<', "&lt;").replace('$', "&#36;")
 }
