@@ -31,8 +31,9 @@ pub(super) struct StagingArguments {
     /// any, "glass" (clear), the one material of a scene file (.xml), or matte with an image as its base colour
     #[arg(long, default_value = "clay", value_name = "NAME|FILE", value_parser = material, help_heading = BARE)]
     material: Finish,
-    /// What lights it: "studio", "sun", "sky", or an image of all around by longitude and latitude
-    #[arg(long, default_value = "studio", value_name = "NAME|IMAGE", value_parser = lighting, help_heading = BARE)]
+    /// What lights it: "studio", "sun", "sky", or an image of all around by longitude and latitude; "auto" is the file's own
+    /// lights (glTF, in candela and lux: a radiance of 1 is 1 cd/m²) and nothing else, or else the studio
+    #[arg(long, default_value = "auto", value_name = "NAME|IMAGE", value_parser = lighting, help_heading = BARE)]
     light: Lighting,
     /// What is seen beside it: "sky", a radiance such as 1,1,1, or "transparent", which leaves out the ground too
     #[arg(long, default_value = "sky", value_name = "R,G,B|transparent", value_parser = background, help_heading = BARE)]
@@ -57,7 +58,7 @@ impl StagingArguments {
             (self.fov.is_some(), "--fov"),
             (self.target.is_some(), "--target"),
             (self.material != Finish::Clay, "--material"),
-            (!matches!(self.light, Lighting::Studio), "--light"),
+            (self.light != Lighting::Auto, "--light"),
             (!matches!(self.background, Background::Sky), "--background"),
             (self.no_ground, "--no-ground"),
             (self.write_scene.is_some(), "--write-scene"),
@@ -92,11 +93,12 @@ impl StagingArguments {
 /// Where light comes from.
 fn lighting(text: &str) -> Result<Lighting, String> {
     match text {
+        "auto" => Ok(Lighting::Auto),
         "studio" => Ok(Lighting::Studio),
         "sun" => Ok(Lighting::Sun),
         "sky" => Ok(Lighting::Sky),
         image if Path::new(image).is_file() => Ok(Lighting::Environment(image.into())),
-        _ => Err("write studio, sun, sky, or the name of an image that is there".to_owned()),
+        _ => Err("write auto, studio, sun, sky, or the name of an image that is there".to_owned()),
     }
 }
 

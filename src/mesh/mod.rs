@@ -39,7 +39,8 @@ pub use generate::{
     menger, menger_triangles, rectangle, sphere, terrain,
 };
 pub use gltf::{
-    GltfCamera, GltfPart, GltfScene, Projection, gltf_is_animated, read_gltf, read_gltf_camera,
+    GltfCamera, GltfLight, GltfLightKind, GltfPart, GltfScene, GltfSetting, Projection,
+    gltf_is_animated, read_gltf, read_gltf_setting,
 };
 pub use mtl::BARE_COLOR;
 pub use parts::{Part, Parts, read_parts};

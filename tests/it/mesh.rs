@@ -4,6 +4,9 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
 
+use etendue::budget::Budget;
+use etendue::description;
+use etendue::render::{Lighting, Options, Overrides, Session, Silent, Staging, describe_mesh};
 use serde_json::Value;
 
 /// Runs `etendue mesh` with the words of `arguments` in `folder`.
@@ -202,4 +205,133 @@ fn what_cannot_be_done_is_refused_with_a_reason_and_leaves_nothing() {
         assert!(said.contains(message), "{arguments}: {said}");
     }
     assert_eq!(names(folder), ["broken.obj"]);
+}
+
+/// A square of 20 × 20 in y = 0, of reflectance 0.5, that a camera 10 above its middle looks down at with a narrow view; and
+/// one light at a height of 2 that points down.
+fn lit_square(light: &str, turned: &str) -> String {
+    format!(
+        r#"{{"asset": {{"version": "2.0"}}, "scenes": [{{"nodes": [0, 1, 2]}}],
+        "extensions": {{"KHR_lights_punctual": {{"lights": [{light}]}}}},
+        "nodes": [{{"mesh": 0}},
+            {{"camera": 0, "translation": [0, 10, 0], "rotation": [-0.70710678, 0, 0, 0.70710678]}},
+            {{"translation": [0, 2, 0], "rotation": {turned}, "scale": [3, 3, 3],
+                "extensions": {{"KHR_lights_punctual": {{"light": 0}}}}}}],
+        "cameras": [{{"type": "perspective", "perspective": {{"yfov": 0.002, "znear": 0.1}}}}],
+        "materials": [{{"pbrMetallicRoughness": {{"baseColorFactor": [0.5, 0.5, 0.5, 1]}}}}],
+        "meshes": [{{"primitives": [{{"attributes": {{"POSITION": 0}}, "material": 0, "mode": 5}}]}}],
+        "accessors": [{{"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3",
+            "min": [-10, 0, -10], "max": [10, 0, 10]}}],
+        "bufferViews": [{{"buffer": 0, "byteLength": 48}}],
+        "buffers": [{{"byteLength": 48, "uri": "square.bin"}}]}}"#
+    )
+}
+
+#[test]
+fn lights_of_a_gltf_file_give_what_candela_and_lux_say() {
+    use std::f64::consts::PI;
+    const DOWN: &str = "[-0.70710678, 0, 0, 0.70710678]";
+    const UP: &str = "[0.70710678, 0, 0, 0.70710678]";
+    // 30° from straight down.
+    const ASLANT: &str = "[-0.5, 0, 0, 0.8660254]";
+    let folder = tempfile::tempdir().unwrap();
+    let corners = [
+        [-10.0, 0.0, -10.0],
+        [-10.0, 0.0, 10.0],
+        [10.0, 0.0, -10.0],
+        [10.0, 0.0, 10.0f32],
+    ];
+    let bytes: Vec<u8> = corners
+        .iter()
+        .flatten()
+        .flat_map(|x| x.to_le_bytes())
+        .collect();
+    fs::write(folder.path().join("square.bin"), bytes).unwrap();
+    let path = folder.path().join("square.gltf");
+    let describe = |text: &str, staging: &Staging| {
+        fs::write(&path, text).unwrap();
+        let options = description::Options::default();
+        describe_mesh(&path, staging, &options, &Budget::default())
+    };
+    let seen = |light: &str, turned: &str, lighting: Lighting| {
+        let staging = Staging {
+            lighting,
+            ..Staging::default()
+        };
+        let mut bare = describe(&lit_square(light, turned), &staging).unwrap();
+        let overrides = Overrides {
+            size: Some((4, 4)),
+            spp: Some(16),
+            ..Overrides::default()
+        };
+        overrides.apply(&mut bare.description);
+        let mut session = Session::default();
+        session.give(bare.mesh);
+        let rendered = session.render(&bare.description, &Options::default(), &Silent);
+        let rendered = rendered.unwrap();
+        let told = rendered
+            .warnings
+            .iter()
+            .map(|w| w.message.clone())
+            .collect::<Vec<_>>();
+        // To the first order, what changes over the view cancels in its mean.
+        let image = rendered.image;
+        let mean = |c: usize| {
+            let pixels = image.data().chunks(image.channels().len());
+            pixels.map(|pixel| f64::from(pixel[c])).sum::<f64>() / 16.0
+        };
+        ([0, 1, 2].map(mean), told)
+    };
+    // Radiance is illuminance · reflectance / π.
+    let point = r#"{"type": "point", "intensity": 80, "color": [1, 0.5, 0]}"#;
+    let sun = r#"{"type": "directional", "intensity": 6}"#;
+    let spot = r#"{"type": "spot", "intensity": 80, "spot": {"innerConeAngle": 0.4, "outerConeAngle": 0.7}}"#;
+    // Linear in the angle: 30° are 0.5236 rad.
+    let faded = (0.7 - PI / 6.0) / (0.7 - 0.4);
+    let on_axis = 80.0 / 4.0 * 0.5 / PI;
+    for (light, turned, expected) in [
+        (point, UP, [on_axis, 0.5 * on_axis, 0.0]),
+        (sun, DOWN, [6.0 * 0.5 / PI; 3]),
+        (sun, ASLANT, [6.0 * 0.75f64.sqrt() * 0.5 / PI; 3]),
+        (sun, UP, [0.0; 3]),
+        (spot, DOWN, [on_axis; 3]),
+        (spot, ASLANT, [faded * on_axis; 3]),
+        (spot, UP, [0.0; 3]),
+    ] {
+        let (found, _) = seen(light, turned, Lighting::Auto);
+        for (found, expected) in found.iter().zip(expected) {
+            let error = (found - expected).abs();
+            assert!(
+                error <= 1e-3 * expected,
+                "{light} {turned}: {found}, {expected}"
+            );
+        }
+    }
+    let says = |told: &[String], what: &str| told.iter().any(|message| message.contains(what));
+    let (_, told) = seen(spot, DOWN, Lighting::Auto);
+    assert!(!says(&told, "light"), "{told:?}");
+    let far = r#"{"type": "point", "intensity": 1e6, "range": 3}"#;
+    let (_, told) = seen(far, DOWN, Lighting::Auto);
+    assert!(
+        says(&told, "--exposure auto") && says(&told, "beyond their range"),
+        "{told:?}"
+    );
+    let (staged, told) = seen(point, DOWN, Lighting::Sky);
+    assert!(says(&told, "own lights (1) are left out"), "{told:?}");
+    assert_eq!(staged, seen(sun, DOWN, Lighting::Sky).0);
+    for (wrong, message) in [
+        (
+            r#"{"type": "point", "intensity": -1}"#,
+            "light 0: its intensity or its colour is negative",
+        ),
+        (
+            r#"{"type": "spot", "spot": {"innerConeAngle": 2}}"#,
+            "light 0: innerConeAngle 2",
+        ),
+        ("", "light 0 is out of range"),
+        ("7", "KHR_lights_punctual is malformed"),
+    ] {
+        let error = describe(&lit_square(wrong, DOWN), &Staging::default()).unwrap_err();
+        assert!(error.to_string().contains(message), "{error}");
+    }
 }

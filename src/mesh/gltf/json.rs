@@ -17,6 +17,7 @@ use super::OrWhy;
 pub(super) struct Root<'a> {
     pub(super) asset: Asset,
     pub(super) extensions_required: Vec<String>,
+    pub(super) extensions: RootExtensions,
     pub(super) scene: Option<usize>,
     pub(super) scenes: Vec<Scene>,
     pub(super) nodes: Vec<Node>,
@@ -36,6 +37,14 @@ pub(super) struct Root<'a> {
 pub(super) struct Asset {
     pub(super) version: Option<String>,
     pub(super) min_version: Option<String>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(default)]
+pub(super) struct RootExtensions {
+    /// Read by those alone who show lights.
+    #[serde(rename = "KHR_lights_punctual")]
+    pub(super) lights: Option<Value>,
 }
 
 #[derive(Deserialize, Default)]
@@ -69,9 +78,15 @@ pub(super) struct NodeExtensions {
     #[serde(rename = "EXT_mesh_gpu_instancing")]
     pub(super) instancing: Option<Instancing>,
     #[serde(rename = "KHR_lights_punctual")]
-    pub(super) light: Option<IgnoredAny>,
+    pub(super) light: Option<NodeLight>,
     #[serde(rename = "KHR_node_visibility")]
     pub(super) visibility: Option<Visibility>,
+}
+
+#[derive(Deserialize)]
+pub(super) struct NodeLight {
+    /// Which of the file's lights.
+    pub(super) light: usize,
 }
 
 #[derive(Deserialize, Default)]

@@ -1,6 +1,6 @@
-//! glTF 2.0, as JSON or GLB: the meshes of the default scene in world space with their colours, and the first camera.
+//! glTF 2.0, as JSON or GLB: the meshes of the default scene in world space with their colours, and its setting: the first camera and the lights.
 //! Morph targets stand at their default weights, skins at their nodes' places, or both as the first animation has them at
-//! a time that is asked for. Pictures and lights are left out, and animations where no time is, with a warning for each kind. Texture coordinates are those of the base colour, with their origin at the
+//! a time that is asked for. Pictures are left out, lights where they are not asked for, and animations where no time is, with a warning for each kind. Texture coordinates are those of the base colour, with their origin at the
 //! top left, as Mitsuba's bitmaps have it, and stay as they are. A primitive without normals is flat, says the
 //! specification: its mesh has none. Under a mirroring transform the winding turns, so that the outside stays outside.
 
@@ -9,6 +9,7 @@ mod json;
 mod accessor;
 mod animation;
 mod container;
+mod lights;
 mod material;
 mod places;
 mod primitive;
@@ -20,7 +21,7 @@ mod tests;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use glam::DMat4;
+use glam::{DMat4, DVec3};
 
 use super::read::{Decoded, Input, Loaded, ReadOptions, warnings, with_input};
 use super::{Attribute, Mesh, Per};
@@ -91,6 +92,46 @@ pub enum Projection {
     },
 }
 
+/// A light without an extent.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GltfLight {
+    /// Where it is, in world space.
+    pub position: DVec3,
+    /// Whereto it shines, of unit length.
+    pub direction: DVec3,
+    /// Linear red, green and blue: candela, or lux of a directional light. Not negative.
+    pub intensity: [f64; 3],
+    /// How it shines.
+    pub kind: GltfLightKind,
+}
+
+/// How a light shines.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum GltfLightKind {
+    /// Everywhere alike.
+    Point,
+    /// About its direction.
+    Spot {
+        /// How far from the direction its light begins to fade, in radians, from 0 to `outer`.
+        inner: f64,
+        /// And where it ends, up to π/2.
+        outer: f64,
+    },
+    /// In its direction alone, from infinitely far.
+    Directional,
+}
+
+/// What a file says beside its meshes.
+#[derive(Clone, Debug, Default)]
+pub struct GltfSetting {
+    /// The first camera of the scene.
+    pub camera: Option<GltfCamera>,
+    /// Its lights that shine.
+    pub lights: Vec<GltfLight>,
+    /// What is left out of the lights.
+    pub warnings: Vec<Problem>,
+}
+
 /// What is read, or what is wrong, in words.
 type OrWhy<T> = std::result::Result<T, String>;
 
@@ -126,20 +167,26 @@ pub fn read_gltf(path: &Path, options: &ReadOptions, account: &Account) -> Resul
     Ok(scene)
 }
 
-/// The first camera of the default scene of the glTF or GLB file `path`; no mesh is read for it.
+/// The first camera and the lights of the default scene of the glTF or GLB file `path`, at rest; no mesh is read for them.
 ///
 /// # Errors
 /// Where the file cannot be read or is malformed.
-pub fn read_gltf_camera(path: &Path, budget: &Budget) -> Result<Option<GltfCamera>> {
+pub fn read_gltf_setting(path: &Path, budget: &Budget) -> Result<GltfSetting> {
     let account = budget.open();
     let bytes = with_input(path, &account, |input| input.bytes())?;
-    let camera = || -> OrWhy<Option<GltfCamera>> {
+    let setting = || -> OrWhy<GltfSetting> {
         let json = Container::open(&bytes)?.json;
         take_tree(json, &account)?;
         let root = Root::parse(json)?;
-        Ok(Stage::set(&root, &mut Notes::default())?.camera)
+        let stage = Stage::set(&root, &mut Notes::default())?;
+        let mut notes = Notes::default();
+        Ok(GltfSetting {
+            camera: stage.camera,
+            lights: lights::placed(&root, &stage, &mut notes)?,
+            warnings: warnings(path, notes.told()),
+        })
     };
-    camera().map_err(|why| Error::input(why).at(&Location::of_file(path)))
+    setting().map_err(|why| Error::input(why).at(&Location::of_file(path)))
 }
 
 /// Asks for the memory of a JSON text's objects and numbers.
@@ -258,6 +305,11 @@ fn walk(input: Input<'_>, options: &ReadOptions) -> Result<Walk> {
         }
         let stage = Stage::set(&root, &mut walk.notes)?;
         walk.camera = stage.camera;
+        if !options.bare {
+            for _ in &stage.lights {
+                (walk.notes).add("lights are left out (KHR_lights_punctual)");
+            }
+        }
         if !root.animations.is_empty() && options.time.is_none() {
             (walk.notes).add("animations are left out: nodes and weights stand at rest");
         }

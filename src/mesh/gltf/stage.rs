@@ -1,4 +1,4 @@
-//! The nodes of a glTF scene, with their places in the world.
+//! The nodes of a glTF scene, with their places in the world, its first camera and its lights.
 
 use glam::{DMat4, DQuat, DVec3};
 
@@ -13,6 +13,8 @@ pub(super) struct Stage<'r> {
     pub(super) world: Vec<Option<DMat4>>,
     /// The first camera of the scene.
     pub(super) camera: Option<GltfCamera>,
+    /// Lights of the file, by number, and from their spaces to the world.
+    pub(super) lights: Vec<(usize, DMat4)>,
 }
 
 /// A node in its place.
@@ -28,6 +30,7 @@ impl<'r> Stage<'r> {
             nodes: Vec::new(),
             world: vec![None; root.nodes.len()],
             camera: None,
+            lights: Vec::new(),
         };
         let roots = match (root.scene, root.scenes.first()) {
             (Some(index), _) => at(&root.scenes, index, "scene")?.nodes.clone(),
@@ -69,8 +72,8 @@ impl<'r> Stage<'r> {
         to_world: &DMat4,
         notes: &mut Notes,
     ) -> OrWhy<()> {
-        if node.extensions.light.is_some() {
-            notes.add("lights are left out (KHR_lights_punctual)");
+        if let Some(light) = &node.extensions.light {
+            self.lights.push((light.light, *to_world));
         }
         let Some(camera) = node.camera else {
             return Ok(());

@@ -1,8 +1,9 @@
 //! A bare mesh as a scene: framed by its own camera (glTF) or an automatic one, on a ground, under a soft sky
-//! and a key light, in the colours of its vertices, faces or materials where the file has any. The ground is a little
+//! and a key light or the file's own lights (glTF), in the colours of its vertices, faces or materials where the file has any. The ground is a little
 //! lower than the mesh, so that what is flat does not lie in it.
 
 mod frame;
+mod lights;
 mod staging;
 
 use std::path::Path;
@@ -13,8 +14,8 @@ use crate::budget::Budget;
 use crate::description::{Description, Kind, Options, escaped};
 use crate::error::{Error, Location, Result};
 use crate::mesh::{
-    Attribute, GltfCamera, Mesh, MeshFile, Projection, ReadMesh, ReadOptions, extension, read,
-    read_gltf_camera,
+    Attribute, GltfCamera, GltfLight, GltfSetting, Mesh, MeshFile, Projection, ReadMesh,
+    ReadOptions, extension, read, read_gltf_setting,
 };
 use frame::FOV;
 use staging::point;
@@ -100,14 +101,32 @@ pub fn describe_mesh(
         let warning = Error::input(message).at(&Location::of_file(path));
         loaded.warnings.extend_from_slice(warning.problems());
     }
-    let camera = match plugin {
-        "gltf" if !staging.asks_for_camera() => read_gltf_camera(path, budget)?,
-        _ => None,
+    let GltfSetting {
+        camera,
+        mut lights,
+        warnings,
+    } = match plugin {
+        "gltf" => read_gltf_setting(path, budget)?,
+        _ => GltfSetting::default(),
     };
+    let camera = camera.filter(|_| !staging.asks_for_camera());
+    let said = if staging.lighting == Lighting::Auto {
+        loaded.warnings.extend(warnings);
+        let (center, radius) = frame::ball(bounds.0, bounds.1);
+        (!lights.is_empty()).then(|| lights::warning(&lights, center, radius))
+    } else {
+        let left = std::mem::take(&mut lights).len();
+        (left > 0).then(|| Some(format!("the file's own lights ({left}) are left out")))
+    };
+    if let Some(message) = said.flatten() {
+        let warning = Error::input(message).at(&Location::of_file(path));
+        loaded.warnings.extend_from_slice(warning.problems());
+    }
     let subject = Subject {
         plugin,
         bounds,
         camera: camera.and_then(|camera| own_camera(&camera)),
+        lights: &lights,
         mesh: &loaded.mesh,
         staging,
     };
@@ -156,6 +175,8 @@ struct Subject<'a> {
     plugin: &'static str,
     bounds: (Vec3, Vec3),
     camera: Option<OwnCamera>,
+    /// That light it, in place of what else there is.
+    lights: &'a [GltfLight],
     mesh: &'a Mesh,
     staging: &'a Staging,
 }
@@ -276,7 +297,7 @@ fn scene(subject: &Subject<'_>, file: &Path, bare: bool, material: &str) -> Stri
         {material}
     </shape>
 </scene>"#,
-        lights = staging.lights(center, radius, key),
+        lights = staging.lights(center, radius, key, subject.lights),
         ground = if staging.has_ground() {
             ground(center, min, radius, staging.up)
         } else {

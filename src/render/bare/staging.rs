@@ -4,9 +4,11 @@ use std::path::PathBuf;
 
 use glam::{DVec3, Vec3};
 
+use super::lights;
 use crate::budget::Budget;
 use crate::description::{Description, Kind, NodeId, Options, escaped};
 use crate::error::{Error, Location, Result};
+use crate::mesh::GltfLight;
 
 /// Which way is up in a mesh file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -57,8 +59,10 @@ pub enum Finish {
 /// What lights a bare mesh.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Lighting {
-    /// A lamp beside the camera, and a soft sky.
+    /// The file's own lights (glTF), and nothing else; a studio's where it has none.
     #[default]
+    Auto,
+    /// A lamp beside the camera, and a soft sky.
     Studio,
     /// A sun beside the camera, and a blue sky.
     Sun,
@@ -121,7 +125,7 @@ impl Default for Staging {
             aspect: 4.0 / 3.0,
             all_around: false,
             finish: Finish::Clay,
-            lighting: Lighting::Studio,
+            lighting: Lighting::Auto,
             background: Background::Sky,
             ground: true,
         }
@@ -219,8 +223,9 @@ impl Staging {
         }
     }
 
-    /// The lights around a mesh at `center`; `key` points to where the lamp or the sun is.
-    pub(super) fn lights(&self, center: Vec3, radius: f32, key: Vec3) -> String {
+    /// The lights around a mesh at `center`: those of its own file, where there are any, else what is asked for; `key`
+    /// points to where the lamp or the sun is.
+    pub(super) fn lights(&self, center: Vec3, radius: f32, key: Vec3, own: &[GltfLight]) -> String {
         let sky = |own: [f32; 3]| {
             let [r, g, b] = match self.background {
                 Background::Color(color) => color,
@@ -230,8 +235,15 @@ impl Staging {
                 r#"<emitter type="constant"><rgb name="radiance" value="{r}, {g}, {b}"/></emitter>"#
             )
         };
+        if !own.is_empty() {
+            let backdrop = match self.background {
+                Background::Color(color) => sky(color),
+                Background::Sky | Background::Transparent => String::new(),
+            };
+            return backdrop + &lights::emitters(own);
+        }
         match &self.lighting {
-            Lighting::Studio => {
+            Lighting::Auto | Lighting::Studio => {
                 let lamp = point(center + 4.0 * radius * key);
                 let size = 0.6 * radius;
                 format!(

@@ -4,7 +4,7 @@
 use std::fs;
 
 use etendue::budget::Budget;
-use etendue::mesh::{ReadOptions, read_gltf, read_gltf_camera};
+use etendue::mesh::{ReadOptions, read_gltf, read_gltf_setting};
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|parts: (&[u8], &[u8])| {
@@ -20,5 +20,5 @@ fuzz_target!(|parts: (&[u8], &[u8])| {
             assert!(part.mesh.triangles.iter().flatten().all(|&i| (i as usize) < vertices));
         }
     }
-    let _ = read_gltf_camera(&path, &budget);
+    let _ = read_gltf_setting(&path, &budget);
 });
