@@ -99,7 +99,7 @@ impl Kernel {
             Set::Portable => task.run::<f32>(),
             // SAFETY: a `Kernel` exists only where the processor has its instructions, and what has AVX-512 has AVX2.
             #[cfg(target_arch = "x86_64")]
-            Set::Avx2 | Set::Avx512 => unsafe { x86::avx2::run_single(task) },
+            Set::Avx2 | Set::Avx512 => unsafe { x86::single::run(task) },
         }
     }
 }

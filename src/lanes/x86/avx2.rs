@@ -21,15 +21,6 @@ pub(in crate::lanes) unsafe fn run<T: Task>(task: T) -> T::Output {
     task.run::<F32x8>()
 }
 
-/// Does `task` with one lane.
-///
-/// # Safety
-/// The processor has the instructions.
-#[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
-pub(in crate::lanes) unsafe fn run_single<T: Task>(task: T) -> T::Output {
-    task.run::<f32>()
-}
-
 /// # Safety
 /// The processor has the instructions.
 #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
