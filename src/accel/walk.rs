@@ -299,6 +299,19 @@ impl<'t, L: Ledger + ?Sized, const ANY: bool> Party<'_, 't, '_, L, ANY> {
         }
     }
 
+    /// The way through the instance, which is entered there.
+    #[inline(always)]
+    fn way_by(&self, instance: u32, entry: f32) -> Way {
+        if instance == self.way.instance {
+            return self.way;
+        }
+        Way {
+            group: self.walk.tracer.instances[instance as usize].group,
+            instance,
+            entry,
+        }
+    }
+
     /// The tree of an instance, and how it is entered.
     #[inline(always)]
     fn instance(&self, visit: &Visit, instance: u32) -> Met<'t> {
@@ -360,11 +373,8 @@ impl<'t, L: Ledger + ?Sized, const ANY: bool> Walker<'t> for Party<'_, 't, '_, L
     #[inline(always)]
     fn fetch(&self, instance: u32, item: u32) {
         let tracer = self.walk.tracer;
-        let group = match instance == self.way.instance {
-            true => self.way.group,
-            false => tracer.instances[instance as usize].group,
-        };
-        let item = &tracer.groups[group as usize].items()[item as usize];
+        let way = self.way_by(instance, 0.0);
+        let item = &tracer.groups[way.group as usize].items()[item as usize];
         if item.as_instance().is_none() {
             tracer.shapes.get(item.shape).fetch(item.index);
         }
@@ -373,15 +383,7 @@ impl<'t, L: Ledger + ?Sized, const ANY: bool> Walker<'t> for Party<'_, 't, '_, L
     #[inline(always)]
     fn other(&mut self, visit: &Visit, item: u32) -> Met<'t> {
         let tracer = self.walk.tracer;
-        let way = if visit.instance == self.way.instance {
-            self.way
-        } else {
-            Way {
-                group: tracer.instances[visit.instance as usize].group,
-                instance: visit.instance,
-                entry: visit.entry,
-            }
-        };
+        let way = self.way_by(visit.instance, visit.entry);
         let item = &tracer.groups[way.group as usize].items()[item as usize];
         match item.as_instance() {
             Some(instance) => self.instance(visit, instance),

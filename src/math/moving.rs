@@ -295,9 +295,7 @@ impl Chain {
         });
         Transform::of_parts(&forward, &inverse)
     }
-}
 
-impl Chain {
     /// [`Moving::back`].
     fn back(&self, time: f32) -> Affine3 {
         let time = f64::from(time);
