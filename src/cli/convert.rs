@@ -45,7 +45,7 @@ pub(super) struct Arguments {
     denoising: DenoiseArguments,
     #[command(flatten)]
     memory: MemoryArguments,
-    /// No warnings
+    /// No word on what was written, no warnings
     #[arg(short, long)]
     quiet: bool,
     /// Print a JSON object for each image that is written: file, width, height, channels
@@ -68,6 +68,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     for output in &outputs {
         image::check_writable(output)?;
         arguments.display.transform().check(output)?;
+    }
+    if let Some(unused) = arguments
+        .display
+        .unused(outputs.iter().map(PathBuf::as_path))
+        && !arguments.quiet
+    {
+        report::warnings(unused.problems());
     }
     let denoiser = arguments.denoising.denoiser(0)?;
     if let Some(columns) = arguments.sheet {
@@ -156,6 +163,8 @@ fn write(arguments: &Arguments, output: &Path, image: &Image, metadata: Metadata
             "channels": image.channels(),
         });
         output::object(object);
+    } else if !arguments.quiet {
+        output::written(output, image);
     }
     Ok(())
 }

@@ -10,7 +10,7 @@ use etendue::image::{self, Image, Metadata};
 
 use super::display::DisplayArguments;
 use super::memory::MemoryArguments;
-use super::{report, status};
+use super::{output, report, status};
 
 /// Whether and with what images are denoised.
 #[derive(Args, Clone, Debug)]
@@ -73,7 +73,7 @@ pub(super) struct Arguments {
     display: DisplayArguments,
     #[command(flatten)]
     memory: MemoryArguments,
-    /// No warnings
+    /// No word on what was written, no warnings
     #[arg(short, long)]
     quiet: bool,
 }
@@ -87,6 +87,11 @@ Examples:
 pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     image::check_writable(&arguments.output)?;
     arguments.display.transform().check(&arguments.output)?;
+    if let Some(unused) = arguments.display.unused([arguments.output.as_path()])
+        && !arguments.quiet
+    {
+        report::warnings(unused.problems());
+    }
     let denoiser = arguments.library.denoiser(0)?;
     let picture = image::read(&arguments.input, &arguments.memory.budget().open())?;
     if !arguments.quiet {
@@ -104,6 +109,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         .with("denoiser", name(&denoiser));
     let display = arguments.display.transform();
     display::save(&arguments.output, &denoised, &metadata, &display)?;
+    if !arguments.quiet {
+        output::written(&arguments.output, &denoised);
+    }
     Ok(status::DONE)
 }
 

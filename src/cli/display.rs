@@ -1,9 +1,13 @@
 //! Arguments on how linear values become codes for a screen.
 
+use std::path::Path;
+
 use clap::{Args, ValueEnum};
 use etendue::display::{
     Ambient, AmbientMode, Depth, DisplayTransform, Exposure, Gamut, Transfer, View,
 };
+use etendue::error::Error;
+use etendue::image::Format;
 
 use super::parse;
 
@@ -82,6 +86,29 @@ impl DisplayArguments {
             depth: self.bits,
             dither: self.dither,
         }
+    }
+
+    /// What to say where they are given, and none of the outputs is a picture for a screen.
+    pub(super) fn unused<'a>(&self, outputs: impl IntoIterator<Item = &'a Path>) -> Option<Error> {
+        let asked = DisplayTransform {
+            depth: Depth::Eight,
+            ..self.transform()
+        };
+        let given = asked != DisplayTransform::default() || self.bits == Depth::Sixteen;
+        let is_linear = |output: &&Path| {
+            matches!(
+                Format::of_output(output),
+                Ok(Format::Exr | Format::Hdr | Format::Pfm)
+            )
+        };
+        let mut outputs = outputs.into_iter().peekable();
+        let first = outputs.peek()?.display().to_string();
+        if !given || !outputs.all(|output| is_linear(&output)) {
+            return None;
+        }
+        let message =
+            format!("{first} keeps linear values, and display options change nothing in it");
+        Some(Error::input(message).help("write .png, .jpg or .tif, now or by \"etendue convert\""))
     }
 }
 
@@ -174,6 +201,32 @@ fn depth(text: &str) -> Result<Depth, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn display_options_are_said_to_be_unused_where_no_output_is_for_a_screen() {
+        #[derive(clap::Parser)]
+        struct Command {
+            #[command(flatten)]
+            display: DisplayArguments,
+        }
+        let unused = |options: &str, outputs: &[&str]| {
+            let words = std::iter::once("command").chain(options.split_whitespace());
+            let Command { display } = clap::Parser::parse_from(words);
+            display.unused(outputs.iter().map(Path::new)).is_some()
+        };
+        for options in [
+            "--view agx",
+            "--exposure -1",
+            "--bits 16",
+            "--dither",
+            "--encode pq",
+        ] {
+            assert!(unused(options, &["a.exr", "b.hdr"]), "{options}");
+            assert!(!unused(options, &["a.exr", "b.png"]), "{options}");
+            assert!(!unused(options, &["a.part"]), "{options}");
+        }
+        assert!(!unused("", &["a.exr"]) && !unused("--bits 32", &["a.exr"]));
+    }
 
     #[test]
     fn curves_and_exposures_are_read_and_bounded() {

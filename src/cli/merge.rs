@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use etendue::error::Result;
-use etendue::render::{MergeReport, Merged, human_duration, merge};
+use etendue::error::{Error, Result};
+use etendue::render::{MergeReport, Merged, human_duration, is_part, merge};
 use etendue::sensor::Window;
 use etendue::{display, image};
 
@@ -53,6 +53,15 @@ Examples:
 
 /// Runs the command; the answer is the exit status.
 pub(super) fn run(arguments: &Arguments) -> Result<u8> {
+    if is_part(&arguments.output) {
+        let message = format!(
+            "{} is a part, and no place for the image",
+            arguments.output.display()
+        );
+        let help =
+            "name the image before its parts, as in: etendue merge image.exr left.part right.part";
+        return Err(Error::input(message).help(help));
+    }
     image::check_writable(&arguments.output)?;
     let limit = arguments.memory.budget().limit();
     let Merged {

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use etendue::error::{Error, Result};
+use etendue::image::Image;
 use etendue::{file, image, render};
 use serde_json::Value;
 
@@ -145,6 +146,16 @@ pub(super) fn line(text: &str) {
         }
         _ => {}
     }
+}
+
+/// A line on an image that was written.
+pub(super) fn written(output: &Path, image: &Image) {
+    line(&format!(
+        "{}: {}×{} pixels",
+        output.display(),
+        image.width(),
+        image.height()
+    ));
 }
 
 /// The version of what is printed for programs: it changes where a name that was there changes its meaning or goes.

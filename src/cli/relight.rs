@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 
 use super::display::DisplayArguments;
 use super::memory::MemoryArguments;
-use super::{output, parse, status};
+use super::{output, parse, report, status};
 
 /// Weight the layers of an image anew, without tracing
 ///
@@ -45,6 +45,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     if let Some(output) = &arguments.output {
         image::check_writable(output)?;
         arguments.display.transform().check(output)?;
+        if let Some(unused) = arguments.display.unused([output.as_path()]) {
+            report::warnings(unused.problems());
+        }
         let relit = relight::relight(&image, &arguments.weights).map_err(of_input)?;
         let mut metadata = Metadata::default()
             .with("software", concat!("etendue ", env!("CARGO_PKG_VERSION")))
@@ -54,6 +57,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
             metadata = metadata.with("weights", weights.join(" "));
         }
         display::save(output, &relit, &metadata, &arguments.display.transform())?;
+        if !arguments.json {
+            output::written(output, &relit);
+        }
     }
     let layers = relight::layers(&image);
     if layers.is_empty() {

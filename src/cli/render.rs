@@ -361,6 +361,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     let threads = arguments.run.threads.map_or(0, |threads| threads.get());
     series.denoiser = arguments.denoising.denoiser(threads)?;
     series.viewer = viewer.as_ref();
+    if let Some(unused) = (arguments.display).unused(items.iter().map(|item| item.output.as_path()))
+    {
+        series.warn(&unused);
+    }
     if let Some(option) = arguments.staging.given()
         && !items.iter().any(|item| is_mesh(&item.input))
     {

@@ -164,6 +164,8 @@ fn what_is_missing_doubled_damaged_or_of_another_image_is_named_and_nothing_is_w
     );
     assert!(said.contains("both hold passes 2:3"), "{said}");
     place.succeed("render scene.xml -q -o extra.part --spp 20 --crop 30,5,9,9");
+    let said = place.refused(&format!("merge {all}"));
+    assert!(said.contains("no place for the image"), "{said}");
     let said = merge(&format!("{all} extra.part"));
     assert!(said.contains("extra.part overlap"), "{said}");
 
