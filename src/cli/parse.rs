@@ -78,6 +78,15 @@ pub(super) fn passes(text: &str) -> Parsed<Passes> {
     Ok(Passes { first, end })
 }
 
+/// `320,180.5`
+pub(super) fn place(text: &str) -> Parsed<[f64; 2]> {
+    let numbers: Option<Vec<f64>> = text.split(',').map(|t| t.trim().parse().ok()).collect();
+    match numbers.as_deref() {
+        Some(&[x, y]) if x.is_finite() && y.is_finite() && x >= 0.0 && y >= 0.0 => Ok([x, y]),
+        _ => Err("write it as X,Y in pixels, such as 320,180".to_owned()),
+    }
+}
+
 /// `1,-2,0.5`
 pub(super) fn point(text: &str) -> Parsed<DVec3> {
     let numbers: Option<Vec<f64>> = text.split(',').map(|t| t.trim().parse().ok()).collect();

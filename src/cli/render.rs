@@ -78,6 +78,11 @@ pub(super) struct Arguments {
     /// The most samples a pixel; more where the sampler's sets are larger
     #[arg(long, default_value_t = 1024, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 24), requires = "noise_threshold", help_heading = ADAPTIVE)]
     max_spp: u32,
+    /// Take samples as the eye sees that looks at this place, in pixels of the whole film from its upper left corner: all of
+    /// --spp there, and fewer away from it, as acuity falls with the angle to the gaze (by the camera's field of view; of an
+    /// image without one, as if seen from three times its height). EXR gets the channel "samples"
+    #[arg(long, value_name = "X,Y", value_parser = parse::place, conflicts_with = "noise_threshold", help_heading = ADAPTIVE)]
+    foveate: Option<[f64; 2]>,
 
     /// Render frames START up to, and without, END; each defines $frame
     #[arg(long, value_name = "START:END[:STEP]", value_parser = parse::frames, allow_hyphen_values = true, help_heading = SERIES)]
@@ -156,8 +161,8 @@ pub(super) struct Arguments {
     /// Print what was counted and timed
     #[arg(long, help_heading = TELL)]
     stats: bool,
-    /// Draw how many nodes of the trees the rays of each pixel enter, a sample, as a picture with a legend. Up to
-    /// 16 samples of each pixel are traced once more for it. Names as for OUT
+    /// Draw how many nodes of the trees the rays of each pixel enter, a sample (with --foveate in all of the pixel's), as a
+    /// picture with a legend. Up to 16 samples of each pixel are traced once more for it. Names as for OUT
     #[arg(long, value_name = "OUT.png", help_heading = TELL)]
     heatmap: Option<String>,
 }
@@ -177,6 +182,7 @@ Examples:
   etendue render room.xml -o room-{eye}.exr --stereo 0.065
   etendue render walk.xml -o out/{frame:04}.exr --frames 0:240 -D body=body-{frame:04}.ply
   etendue render room.xml -o room.exr --noise-threshold 0.01 --sampler sobol
+  etendue render room.xml -o room.exr --spp 64 --foveate 320,180 --heatmap work.png
   etendue render big.xml -o big.exr --checkpoint 300 --resume
   etendue render big.xml -o big.png --preview
   etendue render big.xml -o big.exr --tev 127.0.0.1:14158
@@ -226,6 +232,7 @@ impl Arguments {
                 min_spp: self.min_spp.unwrap_or(32).min(self.max_spp),
                 max_spp: self.max_spp,
             }),
+            gaze: self.foveate,
             method: match self.accel {
                 Accel::Brute => Method::Brute,
                 Accel::Tree => Method::Tree,
@@ -268,6 +275,7 @@ impl Arguments {
             (self.preview, "--preview"),
             (self.tev.is_some(), "--tev"),
             (self.denoising.denoise, "--denoise"),
+            (self.foveate.is_some(), "--foveate"),
         ];
         let is_part = is_part(Path::new(&self.output));
         match of_whole.into_iter().find(|(given, _)| *given) {
@@ -674,7 +682,10 @@ impl<'a> Series<'a> {
         let map = Map {
             width: heat.width,
             values: &heat.node_steps,
-            label: "node steps a sample",
+            label: match heat.of_pixels {
+                true => "node steps a pixel",
+                false => "node steps a sample",
+            },
             top: robust_top(&heat.node_steps),
             scale: Scale::FromZero,
         };

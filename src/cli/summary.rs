@@ -137,19 +137,20 @@ pub(super) fn object(item: &Item, ending: &Ending, total: Duration) -> Value {
 
 fn line(path: &Path, report: &Report, total: Duration) {
     let [width, height] = report.size;
-    let taken = match &report.adaptive {
-        None => match &report.passes {
+    let several = |mean: f64, [least, most]: [u32; 2], at_limit: f64| {
+        let mut taken = format!("{mean:.1} samples a pixel, {least} to {most}");
+        if at_limit > 0.0 {
+            taken += &format!(" ({:.1} % have all of them)", 100.0 * at_limit);
+        }
+        taken
+    };
+    let taken = match (&report.adaptive, &report.foveated) {
+        (Some(adaptive), _) => several(adaptive.mean_spp, adaptive.limits, adaptive.at_limit),
+        (None, Some(foveated)) => several(foveated.mean_spp, foveated.limits, foveated.at_limit),
+        (None, None) => match &report.passes {
             None => samples(report.completed.samples),
             Some(passes) => format!("passes {}:{}", passes.start, passes.end),
         },
-        Some(adaptive) => {
-            let (mean, [least, most]) = (adaptive.mean_spp, adaptive.limits);
-            let mut taken = format!("{mean:.1} samples a pixel, {least} to {most}");
-            if adaptive.at_limit > 0.0 {
-                taken += &format!(" ({:.1} % have all of them)", 100.0 * adaptive.at_limit);
-            }
-            taken
-        }
     };
     output::line(&format!(
         "{}: {width}×{height}, {taken}, {}",

@@ -25,6 +25,7 @@ use super::origin::Outcome;
 use super::plan::{Completed, PASS};
 use super::prepare::Job;
 use super::progress::{Phase, Progress};
+use super::rounds::{Rounds, area};
 use super::samples::{self, Sink};
 use super::unit;
 use crate::color::{ColorModel, luminance};
@@ -236,14 +237,14 @@ pub(super) fn render<C: ColorModel>(
     }
 
     let rest = Rest::new(&grid, &ladder, growing.summed.sums.steps());
-    let units = 2 * tiles + rest.units();
+    let units = 2 * tiles + rest.rounds.units();
     if next > units {
         return Err(Error::input(
             "the checkpoint knows of more tiles than there are",
         ));
     }
     let done = next - 2 * tiles;
-    progress.begin(Phase::Render, rest.samples(&grid, 0..rest.units()));
+    progress.begin(Phase::Render, rest.samples(&grid, 0..rest.rounds.units()));
     progress.advance(rest.samples(&grid, 0..done), 0);
     let take = |part| growing.take(&part);
     unit::run(next..units, progress, take, |unit| {
@@ -252,7 +253,10 @@ pub(super) fn render<C: ColorModel>(
     let next = growing.summed.next;
     let completed = Completed {
         samples: ladder.limits()[0],
-        passes: [1 + rest.pass(next - 2 * tiles), 1 + rest.passes()],
+        passes: [
+            1 + rest.rounds.pass(next - 2 * tiles),
+            1 + rest.rounds.passes(),
+        ],
         units: [next, units],
     };
     Ok((growing.summed, completed, ladder))
@@ -296,6 +300,7 @@ impl<C: ColorModel> Growing<'_, '_, C> {
             spp: report.mean_spp.round() as u32,
             samples_complete: 0,
             adaptive: Some(&report),
+            foveated: None,
         };
         (self.progress).picture(&job.picture(&options.scene, image, &outcome));
         Ok(())
@@ -311,10 +316,6 @@ fn pixels(grid: &Grid, tiles: Range<usize>) -> u64 {
 /// How many samples the pilots of tiles take.
 pub(super) fn pilot_samples(grid: &Grid, ladder: &Ladder, tiles: Range<usize>) -> u64 {
     pixels(grid, tiles) * u64::from(2 * ladder.begun())
-}
-
-fn area(window: &Window) -> u64 {
-    u64::from(window.width) * u64::from(window.height)
 }
 
 /// What a unit comes to.
@@ -382,79 +383,27 @@ pub(super) fn pilot<C: ColorModel>(
 pub(super) struct Rest {
     /// The step of each half of each block.
     steps: Vec<usize>,
-    /// How many samples that is.
-    counts: Vec<u32>,
-    /// Tiles by their largest count, the largest first: those that a pass takes are the first of them.
-    tiles: Vec<usize>,
-    /// The first unit of each pass, and the number of units.
-    firsts: Vec<usize>,
+    /// The samples of these steps.
+    rounds: Rounds,
 }
 
 impl Rest {
     pub(super) fn new(grid: &Grid, ladder: &Ladder, steps: Vec<usize>) -> Self {
-        let counts: Vec<u32> = steps.iter().map(|step| ladder.count(*step)).collect();
-        let passes = |tile: usize| {
-            let blocks = grid.tile(tile);
-            let counts = blocks.map(|b| counts[2 * b].max(counts[2 * b + 1]));
-            counts.max().unwrap_or(0).div_ceil(PASS)
-        };
-        let mut tiles: Vec<usize> = (0..grid.tiles()).collect();
-        tiles.sort_by_key(|tile| std::cmp::Reverse(passes(*tile)));
-        let mut firsts = vec![0];
-        for pass in 0..tiles.first().map_or(0, |tile| passes(*tile)) {
-            let taken = tiles.partition_point(|tile| passes(*tile) > pass);
-            firsts.push(firsts[pass as usize] + taken);
-        }
+        let counts = steps.iter().map(|step| ladder.count(*step)).collect();
         Self {
             steps,
-            counts,
-            tiles,
-            firsts,
+            rounds: Rounds::new(grid, counts),
         }
-    }
-
-    fn units(&self) -> usize {
-        self.firsts[self.firsts.len() - 1]
-    }
-
-    fn passes(&self) -> u32 {
-        self.firsts.len() as u32 - 1
     }
 
     /// The units of some passes, of which the first after the pilots is 0; later ones than are needed have none.
     pub(super) fn units_of(&self, passes: Range<u32>) -> Range<usize> {
-        let first = |pass: u32| self.firsts[(pass as usize).min(self.firsts.len() - 1)];
-        first(passes.start)..first(passes.end)
-    }
-
-    /// The pass of a unit; after the last unit, the number of passes.
-    fn pass(&self, unit: usize) -> u32 {
-        self.firsts[1..].partition_point(|first| *first <= unit) as u32
+        self.rounds.units_of(passes)
     }
 
     /// How many samples units take.
     pub(super) fn samples(&self, grid: &Grid, units: Range<usize>) -> u64 {
-        units
-            .flat_map(|unit| self.slots(grid, unit))
-            .map(|(slot, indices)| area(&grid.block(slot / 2)) * indices.len() as u64)
-            .sum()
-    }
-
-    /// The halves of blocks that a unit adds to, each with the indices of its samples.
-    fn slots(
-        &self,
-        grid: &Grid,
-        unit: usize,
-    ) -> impl Iterator<Item = (usize, std::ops::Range<u32>)> {
-        let pass = self.pass(unit);
-        let tile = self.tiles[unit - self.firsts[pass as usize]];
-        grid.tile(tile)
-            .flat_map(|block| [2 * block, 2 * block + 1])
-            .filter_map(move |slot| {
-                let first = pass * PASS;
-                let end = self.counts[slot].min(first + PASS);
-                (first < end).then_some((slot, first..end))
-            })
+        self.rounds.samples(grid, units)
     }
 
     pub(super) fn render<C: ColorModel>(
@@ -467,7 +416,7 @@ impl Rest {
     ) -> Part {
         let mut tally = Tally::default();
         let mut records = Vec::new();
-        for (slot, indices) in self.slots(grid, unit) {
+        for (slot, indices) in self.rounds.slots(grid, unit) {
             let sampler = &ladder.steps[self.steps[slot] - 1].sampler;
             let mut sink = HalfBlock::new(job, grid, slot);
             let count = indices.len() as u32;
@@ -482,21 +431,23 @@ impl Rest {
     }
 }
 
-fn pixels_of(window: Window) -> impl Iterator<Item = [u32; 2]> {
+/// A window's pixels, row by row.
+pub(super) fn pixels_of(window: Window) -> impl Iterator<Item = [u32; 2]> {
     (window.y..window.y + window.height)
         .flat_map(move |y| (window.x..window.x + window.width).map(move |x| [x, y]))
 }
 
 /// Adds samples to the sums of one half of a block.
-struct HalfBlock<'f> {
-    record: Record,
+pub(super) struct HalfBlock<'f> {
+    pub(super) record: Record,
     reach: Window,
     filter: &'f Filter,
-    tally: Tally,
+    pub(super) tally: Tally,
 }
 
 impl<'f> HalfBlock<'f> {
-    fn new<C: ColorModel>(job: &'f Job<'_, C>, grid: &Grid, slot: usize) -> Self {
+    /// No samples yet.
+    pub(super) fn new<C: ColorModel>(job: &'f Job<'_, C>, grid: &Grid, slot: usize) -> Self {
         Self {
             record: Record::new(grid, slot),
             reach: grid.reach(slot / 2),
@@ -611,9 +562,19 @@ impl Given {
         AdaptiveReport {
             noise_threshold,
             limits,
-            mean_spp: self.samples as f64 / self.pixels as f64,
-            at_limit: self.at_limit as f64 / self.pixels as f64,
+            mean_spp: self.mean_spp(),
+            at_limit: self.at_limit(),
         }
+    }
+
+    /// Samples a pixel, on average.
+    pub(super) fn mean_spp(&self) -> f64 {
+        self.samples as f64 / self.pixels as f64
+    }
+
+    /// The share of pixels that got as many samples as possible.
+    pub(super) fn at_limit(&self) -> f64 {
+        self.at_limit as f64 / self.pixels as f64
     }
 }
 

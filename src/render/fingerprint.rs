@@ -112,6 +112,10 @@ impl Fingerprint {
             "seed {} bands {bands} tile {TILE} passes 1, {PASS} block {BLOCK} {:?}",
             options.seed, options.adaptive
         );
+        let settings = match options.gaze {
+            Some(gaze) => format!("{settings} gaze {gaze:?}"),
+            None => settings,
+        };
         Ok(Self {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             scene: hash(&scene.text),
@@ -151,7 +155,7 @@ impl Fingerprint {
                 "the view (sensor, film, sampler or integrator, or an option for them{sources})"
             ))
         } else if self.settings != other.settings {
-            Some("a setting (the seed, the bands or adaptive sampling)".to_owned())
+            Some("a setting (the seed, the bands, adaptive sampling or the gaze)".to_owned())
         } else {
             None
         }

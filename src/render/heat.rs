@@ -1,10 +1,12 @@
 //! Where a render's work lies: for each pixel of the crop the nodes that its rays enter, of all kinds, a sample.
-//! Each pixel is traced by itself, so that its counts are its own; they add up to those of a render.
+//! Each pixel is traced by itself, so that its counts are its own; they add up to those of a render. Where pixels get
+//! different numbers of samples by a gaze, a pixel's nodes are those of all of its samples.
 
 use std::sync::Mutex;
 
 use rayon::prelude::*;
 
+use super::foveated::Fovea;
 use super::plan::PASS;
 use super::prepare::Job;
 use super::progress::{Phase, Progress, Silent};
@@ -21,11 +23,13 @@ use crate::sampler::Stream;
 pub struct Heat {
     /// Pixels across.
     pub width: usize,
-    /// Node steps a sample, row by row.
+    /// Node steps, row by row: a sample, or a pixel where not all pixels get the same number of samples.
     pub node_steps: Vec<f32>,
+    /// Whether they are of all samples of a pixel.
+    pub of_pixels: bool,
     /// What all of it took.
     pub stats: Stats,
-    /// Samples of each pixel: the render's first, 16 at most.
+    /// Samples of each pixel that were traced: the render's first, 16 at most, or all where it gets fewer.
     pub samples: u32,
 }
 
@@ -40,8 +44,12 @@ impl Sink for Counted {
     fn take(&mut self, _: Kernel, _: &Group, _: &[[f32; GROUP]]) {}
 }
 
-/// Traces the job's crop.
-pub(super) fn count<C: ColorModel>(job: &Job<'_, C>, progress: &dyn Progress) -> Result<Heat> {
+/// Traces the job's crop, whose pixels get samples by `fovea` if there is one.
+pub(super) fn count<C: ColorModel>(
+    job: &Job<'_, C>,
+    fovea: Option<&Fovea>,
+    progress: &dyn Progress,
+) -> Result<Heat> {
     let crop = job.view.film.shown();
     let samples = job.view.sampler.sample_count().min(PASS);
     let (width, height) = (crop.width as usize, crop.height as usize);
@@ -62,12 +70,17 @@ pub(super) fn count<C: ColorModel>(job: &Job<'_, C>, progress: &dyn Progress) ->
         let mut of_row = Stats::default();
         for (steps, x) in row.iter_mut().zip(crop.x..) {
             let mut sink = Counted(Tally::default());
-            let pixels = std::iter::once(([x, y], 0..samples));
+            let sampler = fovea.map_or(&job.view.sampler, |fovea| fovea.sampler_of([x, y]));
+            let all = sampler.sample_count();
+            let traced = all.min(samples);
+            let pixels = std::iter::once(([x, y], 0..traced));
             let stream = |[x, y]: [u32; 2], index| Stream::new(job.seed, x, y, index);
-            let sampler = &job.view.sampler;
             samples::estimate(job, sampler, pixels, stream, &Silent, &mut sink);
             let counted = sink.0.stats;
-            *steps = counted.tracing.node_steps as f32 / samples as f32;
+            *steps = counted.tracing.node_steps as f32 / traced as f32;
+            if fovea.is_some() {
+                *steps *= all as f32;
+            }
             of_row.add(&counted);
         }
         progress.advance(u64::from(samples) * width as u64, of_row.rays());
@@ -79,6 +92,7 @@ pub(super) fn count<C: ColorModel>(job: &Job<'_, C>, progress: &dyn Progress) ->
     Ok(Heat {
         width,
         node_steps,
+        of_pixels: fovea.is_some(),
         stats: stats.into_inner().expect("no thread panicked"),
         samples,
     })

@@ -310,6 +310,7 @@ fn finish(
             .map_or(first.spp, |adaptive| adaptive.mean_spp.round() as u32),
         samples_complete: adaptive.as_ref().map_or(first.spp, |a| a.limits[0]),
         adaptive: adaptive.as_ref(),
+        foveated: None,
     };
     let mut machines: Vec<&str> = heads
         .iter()

@@ -12,6 +12,7 @@ mod check;
 mod checkpoint;
 mod colors;
 mod fingerprint;
+mod foveated;
 mod hashing;
 mod heat;
 mod info;
@@ -29,6 +30,7 @@ mod plugins;
 mod prepare;
 mod provenance;
 mod rastered;
+mod rounds;
 mod samples;
 mod sensors;
 mod session;
@@ -47,6 +49,7 @@ use crate::integrator::Stats;
 
 pub use adaptive::AdaptiveReport;
 pub use bare::{Background, BareMesh, Finish, Lighting, Staging, UpAxis, describe_mesh, is_mesh};
+pub use foveated::FoveatedReport;
 pub use heat::Heat;
 pub use info::{NamedFile, SceneInfo, SensorInfo};
 pub use machine::machine;
@@ -95,11 +98,14 @@ pub struct Report {
     /// Pixels across and down.
     #[serde(serialize_with = "named::size")]
     pub size: [u32; 2],
-    /// Samples a pixel; on average where sampling is adaptive.
+    /// Samples a pixel; on average where not all pixels get the same number.
     pub spp: u32,
     /// Where samples went, if sampling is adaptive.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub adaptive: Option<AdaptiveReport>,
+    /// Where samples went, if they go by the distance from a gaze.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub foveated: Option<FoveatedReport>,
     /// Which passes over the film, where it is a part of the image.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub passes: Option<std::ops::Range<u32>>,

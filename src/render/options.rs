@@ -70,6 +70,9 @@ pub struct Options {
     pub colors: Colors,
     /// Where samples go; the same number to every pixel where absent.
     pub adaptive: Option<Adaptive>,
+    /// Where on the film the eye looks, in pixels from its upper left corner: the scene's number of samples there, and fewer
+    /// away from it. No adaptive sampling beside it.
+    pub gaze: Option<[f64; 2]>,
     /// Tree or brute force.
     pub method: Method,
     /// How much work goes into the tree; what suits the scene and the rays where absent.
@@ -105,6 +108,13 @@ pub struct Overrides {
     pub max_depth: Option<i64>,
     /// Whether the image is made for [`crate::denoise`]: with the box filter, and with its guides as layers.
     pub denoise: bool,
+}
+
+impl Options {
+    /// Whether pixels may get different numbers of samples, so that the film's sums stand block by block.
+    pub(super) fn by_blocks(&self) -> bool {
+        self.adaptive.is_some() || self.gaze.is_some()
+    }
 }
 
 impl Overrides {

@@ -4,6 +4,7 @@ use glam::Mat4;
 use serde::{Deserialize, Serialize};
 
 use super::adaptive::AdaptiveReport;
+use super::foveated::FoveatedReport;
 use crate::image::Metadata;
 
 /// What all parts of an image have in common.
@@ -26,11 +27,12 @@ pub(super) struct Origin {
 /// What came of the samples.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Outcome<'a> {
-    /// Samples a pixel, on average where sampling is adaptive.
+    /// Samples a pixel, on average where not all pixels get the same number.
     pub(super) spp: u32,
     /// Samples that every pixel has.
     pub(super) samples_complete: u32,
     pub(super) adaptive: Option<&'a AdaptiveReport>,
+    pub(super) foveated: Option<&'a FoveatedReport>,
 }
 
 impl Origin {
@@ -54,6 +56,14 @@ impl Origin {
             true => (metadata.with("spectralLayoutVersion", "1.0"))
                 .with("emissiveUnits", "W.m^-2.sr^-1"),
             false => metadata,
+        };
+        let metadata = match outcome.foveated {
+            None => metadata,
+            Some(foveated) => metadata
+                .with("gaze_x", foveated.gaze[0])
+                .with("gaze_y", foveated.gaze[1])
+                .with("min_spp", foveated.limits[0])
+                .with("max_spp", foveated.limits[1]),
         };
         match outcome.adaptive {
             None => metadata,

@@ -21,11 +21,11 @@ pub struct Outline {
     pub crop: Window,
     /// Whether that is less than the film.
     pub cropped: bool,
-    /// Samples of a pixel; the most where sampling is adaptive.
+    /// Samples of a pixel; the most where not all pixels get the same number.
     pub spp: u32,
     /// Passes over the film; the most where sampling is adaptive.
     pub passes: u32,
-    /// Whether samples go where the noise is.
+    /// Whether pixels get different numbers of samples: by the noise, or by the distance from a gaze.
     pub adaptive: bool,
     /// Estimated seconds of a processor. It knows pixels, samples and files, and no paths: it may be wrong by a factor of
     /// ten, and alike for images of one scene.
@@ -76,7 +76,7 @@ impl Task for Outlined<'_> {
         };
         let channels = prepare::layout(&color, &view.integrator).count();
         let estimate = Estimate {
-            film: memory::film(film, channels, self.options.adaptive.is_some()),
+            film: memory::film(film, channels, self.options.by_blocks()),
             ..Estimate::of_files(self.description)
         };
         let files = self.description.files(Part::Scene);
@@ -87,7 +87,7 @@ impl Task for Outlined<'_> {
             cropped: film.crop != film.full(),
             spp,
             passes,
-            adaptive: self.options.adaptive.is_some(),
+            adaptive: self.options.by_blocks(),
             seconds: START + prepare::rays(film, spp) as f64 / RAYS + bytes as f64 / BYTES,
             bytes: estimate.total(),
         })

@@ -466,7 +466,7 @@ pub(super) fn prepare<'k, C: ColorModel>(ask: &'k mut Ask<'_>, color: C) -> Resu
         film: memory::film(
             &view.film,
             layout(&color, &view.integrator).stride(),
-            options.adaptive.is_some(),
+            options.by_blocks(),
         ),
         rays: rays(&view.film, view.sampler.sample_count()),
         shutter: view.sensor.shutter(),
@@ -559,17 +559,22 @@ fn written(film: &Film, layout: &Layout) -> Vec<String> {
     }
 }
 
-/// Light that comes to the whole film does not become more where its noise is.
+/// Light that comes to the whole film does not become more where more samples are.
 fn light_anywhere<C: ColorModel>(
     options: &Options,
     integrator: &Integrator<C>,
     name: &str,
 ) -> Result<()> {
-    if !integrator.traces_light() || options.adaptive.is_none() {
+    if !integrator.traces_light() || !options.by_blocks() {
         return Ok(());
     }
-    let message = format!("light of {name} comes to the whole film, and is not sampled adaptively");
-    Err(Error::input(message).help("leave out --noise-threshold, or take --integrator path"))
+    let (how, option) = match options.gaze {
+        Some(_) => ("by a gaze", "--foveate"),
+        None => ("adaptively", "--noise-threshold"),
+    };
+    let message = format!("light of {name} comes to the whole film, and is not sampled {how}");
+    let help = format!("leave out {option}, or take --integrator path");
+    Err(Error::input(message).help(help))
 }
 
 /// The channels of samples.
@@ -622,6 +627,7 @@ impl<C: ColorModel> Job<'_, C> {
             size: [crop.width, crop.height],
             spp: self.view.sampler.sample_count(),
             adaptive: None,
+            foveated: None,
             passes: None,
             completed,
             seed: self.seed,

@@ -33,7 +33,7 @@ const ROWS: u32 = 16;
 pub(super) fn draws(description: &Description, options: &Options) -> bool {
     let integrator = description.root().children(Kind::Integrator);
     let draws = integrator.first().is_some_and(|i| i.plugin() == NAME);
-    draws && options.adaptive.is_none()
+    draws && !options.by_blocks()
 }
 
 /// What was drawn.
@@ -178,6 +178,7 @@ pub(super) fn preview_outcome() -> Outcome<'static> {
         spp,
         samples_complete: spp,
         adaptive: None,
+        foveated: None,
     }
 }
 

@@ -12,6 +12,7 @@ use super::adaptive::{self, AdaptiveReport, Ladder};
 use super::black;
 use super::checkpoint::Keeper;
 use super::colors::Model;
+use super::foveated::{self, Fovea, FoveatedReport};
 use super::heat::{self, Heat};
 use super::options::{Adaptive, Options};
 use super::origin::Outcome;
@@ -128,14 +129,23 @@ impl Task for Render<'_> {
             completed,
             tally,
             adaptive,
+            foveated,
             notes,
-        } = timed(&mut seconds.render, || match &options.adaptive {
-            None if let Integrator::Raster(raster) = &job.view.integrator => {
-                Finished::rastered(&job, raster, progress)
-            }
-            None => Finished::uniform(&job, options, progress, keeper.as_mut()),
-            Some(adaptive) => {
-                Finished::adaptive(&job, (options, adaptive), progress, keeper.as_mut())
+        } = timed(&mut seconds.render, || {
+            match (&options.adaptive, options.gaze) {
+                (Some(_), Some(_)) => Err(Error::input(
+                    "samples go either where the noise is or by a gaze, not both",
+                )),
+                (Some(adaptive), None) => {
+                    Finished::adaptive(&job, (options, adaptive), progress, keeper.as_mut())
+                }
+                (None, Some(gaze)) => {
+                    Finished::foveated(&job, (options, gaze), progress, keeper.as_mut())
+                }
+                (None, None) if let Integrator::Raster(raster) = &job.view.integrator => {
+                    Finished::rastered(&job, raster, progress)
+                }
+                (None, None) => Finished::uniform(&job, options, progress, keeper.as_mut()),
             }
         })?;
         let mut warnings = job.warnings.clone();
@@ -148,7 +158,11 @@ impl Task for Render<'_> {
             report.spp = adaptive.mean_spp.round() as u32;
             report.adaptive = Some(adaptive);
         }
-        if let (Integrator::Raster(raster), None) = (&job.view.integrator, &options.adaptive) {
+        if let Some(foveated) = foveated {
+            report.spp = foveated.mean_spp.round() as u32;
+            report.foveated = Some(foveated);
+        }
+        if let (Integrator::Raster(raster), false) = (&job.view.integrator, options.by_blocks()) {
             report.spp = raster.pattern.count() as u32;
         }
         tell(&mut report, &tally, &job.view.film);
@@ -176,6 +190,7 @@ impl Task for Render<'_> {
                 spp: report.spp,
                 samples_complete: report.completed.samples,
                 adaptive: report.adaptive.as_ref(),
+                foveated: report.foveated.as_ref(),
             }),
             report,
             warnings,
@@ -200,6 +215,12 @@ impl Task for Part<'_> {
     fn run<C: ColorModel>(mut self, color: C) -> Result<Parted> {
         let (description, options) = (self.ask.description, self.ask.options);
         let progress = self.ask.progress;
+        if options.gaze.is_some() {
+            let message = "samples by the distance from a gaze make an image, and no part of one";
+            return Err(Error::input(message).help(
+                "leave out --foveate, or name the output .exr; crops can be rendered by themselves",
+            ));
+        }
         let job = prepare::prepare(&mut self.ask, color)?;
         let View { film, sampler, .. } = &job.view;
         let spp = sampler.sample_count();
@@ -267,8 +288,10 @@ impl Task for Warm<'_> {
     type Output = Heat;
 
     fn run<C: ColorModel>(mut self, color: C) -> Result<Heat> {
-        let progress = self.0.progress;
-        heat::count(&prepare::prepare(&mut self.0, color)?, progress)
+        let (options, progress) = (self.0.options, self.0.progress);
+        let job = prepare::prepare(&mut self.0, color)?;
+        let fovea = options.gaze.map(|gaze| Fovea::new(&job.view, gaze));
+        heat::count(&job, fovea.transpose()?.as_ref(), progress)
     }
 }
 
@@ -278,6 +301,7 @@ struct Finished {
     completed: Completed,
     tally: Tally,
     adaptive: Option<AdaptiveReport>,
+    foveated: Option<FoveatedReport>,
     /// What the user should know of the image.
     notes: Vec<Problem>,
 }
@@ -300,6 +324,7 @@ impl Finished {
             completed,
             tally,
             adaptive: None,
+            foveated: None,
             notes: Vec::new(),
         })
     }
@@ -315,6 +340,7 @@ impl Finished {
             completed: drawn.completed,
             tally: drawn.sums.tally,
             adaptive: None,
+            foveated: None,
             notes: drawn.notes,
         })
     }
@@ -342,6 +368,32 @@ impl Finished {
                 adaptive::Given::new(&job.view.film, ladder.limits(), blocks)
                     .report(options.1.noise_threshold, ladder.limits()),
             ),
+            foveated: None,
+            notes: Vec::new(),
+        })
+    }
+
+    fn foveated<C: ColorModel>(
+        job: &Job<'_, C>,
+        options: (&Options, [f64; 2]),
+        progress: &dyn Progress,
+        mut keeper: Option<&mut Keeper>,
+    ) -> Result<Self> {
+        let (summed, completed, limits) =
+            foveated::render(job, options, progress, keeper.as_deref_mut())?;
+        if let Some(keeper) = keeper {
+            keeper.finish(&summed, completed.is_whole());
+        }
+        let (film, blocks) = (&job.view.film, &summed.sums);
+        let mut tally = *blocks.tally();
+        Ok(Self {
+            image: added(&mut tally.times.film, || {
+                foveated::develop(film, &job.layout(), blocks)
+            })?,
+            completed,
+            tally,
+            adaptive: None,
+            foveated: Some(FoveatedReport::new(film, options.1, limits, blocks)),
             notes: Vec::new(),
         })
     }

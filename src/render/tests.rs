@@ -113,11 +113,13 @@ const ADAPTIVE: Adaptive = Adaptive {
 
 #[test]
 fn a_render_that_is_stopped_again_and_again_ends_with_the_same_bits() {
-    for adaptive in [None, Some(ADAPTIVE)] {
+    let gaze = Some([9.0, 31.5]);
+    for (adaptive, gaze) in [(None, None), (Some(ADAPTIVE), None), (None, gaze)] {
         let place = Place::new();
         let scene = place.scene(SCENE);
         let at_once = Options {
             adaptive,
+            gaze,
             ..Options::default()
         };
         let whole = render(&scene, &at_once, &Silent).unwrap();
@@ -128,6 +130,7 @@ fn a_render_that_is_stopped_again_and_again_ends_with_the_same_bits() {
             let options = Options {
                 threads: std::num::NonZeroUsize::new(1 + runs % 3),
                 adaptive,
+                gaze,
                 ..place.keeping()
             };
             let rendered = render(&scene, &options, &Watch::stopping_after(1)).unwrap();
@@ -699,6 +702,163 @@ fn adaptive_sampling_of_rare_light_does_not_bias_the_mean() {
         (mean - expected).abs() < 3.5 * error,
         "{mean} ± {error} is not {expected}"
     );
+}
+
+/// So wide that pixels are finer than what the eye sees away from the gaze.
+fn wide(place: &Place, film: &str, sampler: &str, spp: u32) -> Description {
+    let text = SCENE
+        .replacen("value='70'/>", &format!("value='248'/>{film}"), 1)
+        .replacen("value='40'/></film>", "value='16'/></film>", 1);
+    let mut scene = place.scene(&text);
+    let overrides = Overrides {
+        sampler: Some(sampler.to_owned()),
+        spp: Some(spp),
+        ..Overrides::default()
+    };
+    overrides.apply(&mut scene);
+    scene
+}
+
+/// At the left edge.
+fn gazing() -> Options {
+    Options {
+        gaze: Some([4.0, 8.0]),
+        ..Options::default()
+    }
+}
+
+#[test]
+fn samples_fall_with_the_distance_from_a_gaze_where_they_are_those_of_a_render_without() {
+    let place = Place::new();
+    for sampler in crate::sampler::Sampler::NAMES {
+        let scene = wide(&place, "<rfilter type='box'/>", sampler, 32);
+        let rendered = |options: &Options| render(&scene, options, &Silent).unwrap();
+        let uniform = rendered(&Options::default()).image;
+        let Rendered { image, report, .. } = rendered(&gazing());
+        let foveated = report.foveated.unwrap();
+        let samples = image.channel("samples").unwrap();
+        let counts: Vec<f32> = (0..248).map(|x| image.get(x, 8, samples)).collect();
+        assert!(counts.is_sorted_by(|a, b| a >= b), "{sampler}: {counts:?}");
+        let [least, most] = foveated.limits.map(|n| n as f32);
+        assert_eq!([counts[247], counts[0]], [least, most], "{sampler}");
+        assert!(most >= 32.0 && 2.0 * least <= most, "{sampler}: {counts:?}");
+        let mean = image.data().chunks_exact(4).map(|p| f64::from(p[3]));
+        let mean = mean.sum::<f64>() / (248.0 * 16.0);
+        assert!((mean - foveated.mean_spp).abs() < 1e-9, "{sampler}");
+        for (x, y) in (0..16).flat_map(|y| (0..248).map(move |x| (x, y))) {
+            if image.get(x, y, samples) == most {
+                for channel in 0..3 {
+                    let [a, b] = [&image, &uniform].map(|image| image.get(x, y, channel));
+                    assert!((a - b).abs() <= 1e-6 * b, "{sampler}: {x}, {y}: {a} {b}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_crop_around_a_gaze_has_the_pixels_of_the_whole_whatever_the_threads() {
+    let place = Place::new();
+    let mut scene = wide(&place, "", "stratified", 16);
+    let whole = render(&scene, &gazing(), &Silent).unwrap().image;
+    let (x, y, width, height) = (99, 3, 61, 11);
+    let overrides = Overrides {
+        crop: Some(Window {
+            x,
+            y,
+            width,
+            height,
+        }),
+        ..Overrides::default()
+    };
+    overrides.apply(&mut scene);
+    for threads in 1..4 {
+        let options = Options {
+            threads: std::num::NonZeroUsize::new(threads),
+            ..gazing()
+        };
+        let crop = render(&scene, &options, &Silent).unwrap().image;
+        for (px, py) in (0..height).flat_map(|py| (0..width).map(move |px| (px, py))) {
+            assert_eq!(crop.pixel(px, py), whole.pixel(x + px, y + py));
+        }
+    }
+}
+
+/// The mean of all pixels and of those that have the fewest samples, whose filter reaches over blocks of other counts.
+#[test]
+fn samples_by_a_gaze_do_not_bias_the_mean() {
+    const SEEDS: u64 = 24;
+    let place = Place::new();
+    for sampler in ["independent", "stratified"] {
+        let scene = wide(&place, "", sampler, 8);
+        let mut session = Session::default();
+        let mut means = |gaze, first_seed| {
+            let means = (0..SEEDS).map(|seed| {
+                let options = Options {
+                    seed: first_seed + seed,
+                    gaze,
+                    ..Options::default()
+                };
+                let rendered = session.render(&scene, &options, &Silent).unwrap();
+                let image = &rendered.image;
+                let mean = |first: u32| {
+                    let all = (0..16).flat_map(|y| (first..248).map(move |x| (x, y)));
+                    let sum: f64 = all.map(|(x, y)| f64::from(image.get(x, y, 1))).sum();
+                    sum / (16.0 * f64::from(248 - first))
+                };
+                [mean(0), mean(180)]
+            });
+            means.collect::<Vec<_>>()
+        };
+        let (foveated, uniform) = (means(gazing().gaze, 0), means(None, SEEDS));
+        for part in 0..2 {
+            let [(a, va), (b, vb)] = [&foveated, &uniform].map(|means| {
+                let n = means.len() as f64;
+                let mean = means.iter().map(|m| m[part]).sum::<f64>() / n;
+                let squares = means.iter().map(|m| (m[part] - mean).powi(2));
+                (mean, squares.sum::<f64>() / (n - 1.0) / n)
+            });
+            let error = (va + vb).sqrt();
+            assert!(error < 2e-3 * b, "{sampler}: {b} ± {error} is too noisy");
+            assert!((a - b).abs() < 3.5 * error, "{sampler}: {a} {b} ± {error}");
+        }
+    }
+}
+
+#[test]
+fn the_heat_map_of_a_gaze_shows_the_work_of_all_samples_of_each_pixel() {
+    let place = Place::new();
+    let scene = wide(&place, "<rfilter type='box'/>", "independent", 16);
+    let mut session = Session::default();
+    let rendered = session.render(&scene, &gazing(), &Silent).unwrap();
+    let heat = session.heat(&scene, &gazing(), &Silent).unwrap();
+    assert!(heat.of_pixels);
+    assert_eq!(heat.stats, rendered.report.stats);
+    let sum: f64 = heat.node_steps.iter().map(|steps| f64::from(*steps)).sum();
+    let counted = heat.stats.tracing.node_steps as f64;
+    assert!((sum / counted - 1.0).abs() < 1e-5, "{sum} {counted}");
+}
+
+#[test]
+fn a_gaze_must_be_on_the_film_and_the_only_one_that_says_where_samples_go() {
+    let place = Place::new();
+    let scene = place.scene(SCENE);
+    let said = |options: Options| render(&scene, &options, &Silent).unwrap_err().to_string();
+    for gaze in [[70.5, 2.0], [3.0, -1.0], [f64::NAN, 1.0]] {
+        let said = said(Options {
+            gaze: Some(gaze),
+            ..Options::default()
+        });
+        assert!(
+            said.contains("is not on the film, which is 70x40"),
+            "{said}"
+        );
+    }
+    let said = said(Options {
+        adaptive: Some(ADAPTIVE),
+        ..gazing()
+    });
+    assert!(said.contains("not both"), "{said}");
 }
 
 #[test]

@@ -45,6 +45,7 @@ pub(super) fn render<C: ColorModel>(
                 spp: plan.spp(),
                 samples_complete: plan.completed(summed.next).samples,
                 adaptive: None,
+                foveated: None,
             };
             progress.picture(&job.picture(scene, image, &outcome));
         }

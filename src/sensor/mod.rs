@@ -94,6 +94,11 @@ family! {
 }
 
 impl Sensor {
+    /// Whether places on the film are directions from one eye, so that there are angles between them.
+    pub fn has_field_of_view(&self) -> bool {
+        matches!(self, Self::Perspective(_) | Self::ThinLens(_))
+    }
+
     /// Tells the sensor how far the scene reaches, which is known only when that is there.
     pub fn enclose(&mut self, scene: Bounds) {
         match self {

@@ -257,6 +257,15 @@ fn what_does_not_go_with_light_from_anywhere_is_refused() {
         refused.to_string().contains("not sampled adaptively"),
         "{refused}"
     );
+    let options = Options {
+        gaze: Some([2.0, 2.0]),
+        ..Options::default()
+    };
+    let refused = render(&describe(&text), &options, &Silent).unwrap_err();
+    assert!(
+        refused.to_string().contains("not sampled by a gaze"),
+        "{refused}"
+    );
     let blind = text
         .replace("perspective", "radiancemeter")
         .replace("\"12\"", "\"1\"")

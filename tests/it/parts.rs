@@ -268,6 +268,7 @@ fn a_part_is_asked_for_as_it_can_be_made() {
         ("-o a.part --time-limit 3", "--time-limit is for images"),
         ("-o a.part --checkpoint 3", "--checkpoint is for images"),
         ("-o a.part --tev localhost:1", "--tev is for images"),
+        ("-o a.part --foveate 1,1", "--foveate is for images"),
         ("-o a.part --passes 1:6", "this render has 5, 0:5"),
         ("-o a.part --passes 5:", "this render has 5, 0:5"),
         (

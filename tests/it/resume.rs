@@ -201,7 +201,9 @@ fn a_time_limit_is_no_failure_and_can_be_continued() {
         assert_eq!(object(&refused)["status"], "failed");
         let said = String::from_utf8_lossy(&refused.stderr);
         assert!(
-            said.contains("a setting (the seed, the bands or adaptive sampling) has changed"),
+            said.contains(
+                "a setting (the seed, the bands, adaptive sampling or the gaze) has changed"
+            ),
             "{said}"
         );
     }

@@ -34,6 +34,7 @@ fn cheap(line: &str) -> String {
     let mut line = replaced(line, "--triangles", "--triangles 2k");
     line = replaced(&line, "--levels", "--levels 1");
     line = replaced(&line, "--turntable", "--turntable 2");
+    line = replaced(&line, "--foveate", "--foveate 12,8");
     line = line.replace("--quick", "--quick --rounds 1 --sweep samples");
     let small = line.starts_with("for ") || line.contains("--crop");
     if line.contains("etendue render ") && !small {
