@@ -37,8 +37,8 @@ def run(*words, status=(0,)):
     assert done.returncode in status, f"{words}: {done.returncode}\n{done.stdout}{done.stderr}"
 
 
-def means(etendue, image, x, y):
-    """Red, green and blue of a tile's mean, read from the image as PFM, whose rows begin at the bottom."""
+def values(etendue, image):
+    """Red, green and blue of each pixel, read from the image as PFM, whose rows begin at the bottom."""
     pfm = image.with_suffix(".pfm")
     run(etendue, "convert", image, "-o", pfm)
     content = pfm.read_bytes()
@@ -46,12 +46,25 @@ def means(etendue, image, x, y):
     assert head and float(head[3]) < 0, head
     width, height = int(head[1]), int(head[2])
     numbers = struct.unpack(f"<{3 * width * height}f", content[head.end():])
-    sums = [0.0] * 3
-    for row in range(y, y + TILE):
-        for column in range(x, x + TILE):
-            at = 3 * ((height - 1 - row) * width + column)
-            sums = [s + n for s, n in zip(sums, numbers[at:at + 3])]
-    return [s / TILE**2 for s in sums]
+    rows = [numbers[3 * width * row:][:3 * width] for row in range(height)][::-1]
+    return [[row[3 * column:][:3] for column in range(width)] for row in rows]
+
+
+def mean(pixels, x, y):
+    """Of the tile that begins there."""
+    tile = [pixels[row][column] for row in range(y, y + TILE) for column in range(x, x + TILE)]
+    return [sum(channel) / len(tile) for channel in zip(*tile)]
+
+
+def numbers(line, side):
+    """What a line of the inspector tells of a side."""
+    assert line.startswith(side), line
+    return [float(number) for number in line[len(side):].replace("≥", "").split()]
+
+
+def are_near(found, known, part):
+    assert len(found) == len(known) == 3, found
+    assert all(abs(f - k) <= part * abs(k) + 1e-6 for f, k in zip(found, known)), (found, known)
 
 
 class Viewer:
@@ -82,7 +95,7 @@ class Viewer:
 
 
 def use(page, sides, expected):
-    """Does what somebody does who looks; `expected` is what the tile at (16, 16) holds on both sides, where it is known."""
+    """Does what somebody does who looks; `expected` is the pixels of both sides, where they are known."""
     viewer = Viewer(page)
     expect(page.locator("h1")).not_to_be_empty()
     expect(page.locator(".verdict")).to_have_count(1)
@@ -119,17 +132,19 @@ def use(page, sides, expected):
         box = viewer.frame.bounding_box()
         scale = box["width"] / WIDTH
         page.mouse.move(box["x"] + 20.5 * scale, box["y"] + 30.5 * scale)
-        expect(viewer.inspector).to_contain_text("pixel 20, 30;")
+        expect(viewer.inspector).to_contain_text("pixel 20, 30:")
         viewer.press("+")
         assert viewer.frame.bounding_box()["width"] == 2 * box["width"]
     lines = viewer.inspector.inner_text().split("\n")
     assert lines[1].split() == ["R", "G", "B"], lines
-    for side, line, known in zip(sides, lines[2:4], expected or [None, None]):
-        assert line.startswith(side), line
-        shown = [float(number) for number in line[len(side):].split()]
-        assert len(shown) == 3
-        if known:
-            assert all(abs(s - k) <= 2e-3 * abs(k) for s, k in zip(shown, known)), (side, shown, known)
+    assert lines[5].startswith("the means of its tile of 16 × 16 pixels"), lines
+    pixel, tile = [[numbers(lines[i + side], sides[side]) for side in range(2)] for i in [2, 6]]
+    shown = numbers(lines[4], "difference")
+    for found, one, other in zip(shown, *pixel, strict=True):
+        assert abs(found - (other - one)) <= 2e-3 * max(abs(one), abs(other)), lines
+    for side, known in enumerate(expected or []):
+        are_near(pixel[side], known[30][20], 1e-3)
+        are_near(tile[side], mean(known, TILE, TILE), 2e-3)
 
     # A tile that differs is outlined.
     outline = viewer.frame.locator(".tile")
@@ -138,10 +153,30 @@ def use(page, sides, expected):
     place = tile.inner_text().split(":")[0]
     tile.click()
     expect(outline).to_be_visible()
-    expect(viewer.inspector).to_contain_text(f"pixel {place};")
+    expect(viewer.inspector).to_contain_text(f"pixel {place}:")
 
 
-def visit(browser, file, sides, expected=None):
+def use_large(page, sides, expected):
+    """Where not all pixels fit, those of the tile that differs most are told exactly, and others about."""
+    viewer = Viewer(page)
+    page.locator(".tiles button").first.click()
+    x, y = map(int, re.match(r"pixel (\d+), (\d+):", viewer.inspector.inner_text()).groups())
+    for side, line in enumerate(viewer.inspector.inner_text().split("\n")[2:4]):
+        are_near(numbers(line, sides[side]), expected[side][y][x], 1e-3)
+    viewer.stage.evaluate("stage => { stage.scrollTo(0, 0); stage.scrollIntoView(); }")
+    box = viewer.frame.bounding_box()
+    for x in range(5, 320, 10):
+        page.mouse.move(box["x"] + (x + .5) * box["width"] / 320, box["y"] + 5.5 * box["height"] / 240)
+        lines = viewer.inspector.inner_text().split("\n")
+        if "about" in lines[0]:
+            break
+    assert lines[0].startswith(f"pixel {x}, 5, about"), lines
+    for side, line in enumerate(lines[2:4]):
+        for found, known in zip(numbers(line, sides[side]), expected[side][5][x], strict=True):
+            assert abs(found - min(known, 1.0)) <= 0.02 + 0.1 * known, (found, known)
+
+
+def visit(browser, file, sides, expected=None, use=use):
     context = browser.new_context(offline=True)
     page = context.new_page()
     told, asked = [], []
@@ -165,9 +200,14 @@ def main():
         for seed, image in enumerate(images, 1):
             run(etendue, "render", SCENE, "-o", image, "--size", f"{WIDTH}x{HEIGHT}", "--spp", 8, "--seed", seed, "-q")
         run(etendue, "compare", *images, "--report", folder / "compare", status=(1,))
-        expected = [means(etendue, image, TILE, TILE) for image in images]
+        expected = [values(etendue, image) for image in images]
         browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
         visit(browser, folder / "compare/index.html", ["A", "B"], expected)
+        for seed, image in enumerate(images, 1):
+            run(etendue, "render", SCENE, "-o", image, "--size", "320x240", "--spp", 2, "--seed", seed, "-q")
+        run(etendue, "compare", *images, "--report", folder / "large", status=(1,))
+        large = [values(etendue, image) for image in images]
+        visit(browser, folder / "large/index.html", ["A", "B"], large, use_large)
         if python:
             run(etendue, "crosscheck", SCENE, "--size", f"{WIDTH}x{HEIGHT}", "--python", python,
                 "--report", folder / "crosscheck", status=(0, 1, 2))

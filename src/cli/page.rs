@@ -12,6 +12,7 @@ use etendue::display::{DisplayTransform, srgb};
 use etendue::error::Result;
 use etendue::file;
 use etendue::image::{Codes, Encoding, Image, Layout, Picture};
+use exr::prelude::f16;
 use serde_json::{Value, json};
 
 const TEMPLATE: &str = include_str!("page.html");
@@ -20,6 +21,12 @@ const PLACE: &str = "/*DATA*/";
 
 /// Tiles that are listed.
 const WORST: usize = 8;
+/// Bytes of exact values that a pair of images may have: those of 96 × 64 pixels fit, and three pairs of 640 × 360 pixels
+/// are a page of 2 MB.
+const MOST_EXACT: usize = 96 << 10;
+/// The quality of pictures that are read in numbers, and of maps. Noise in a map would take more room than the images.
+const EXACT: u8 = 95;
+const MAP: u8 = 80;
 /// Steps of a colour bar.
 const STEPS: u8 = 16;
 
@@ -110,6 +117,7 @@ impl Pair<'_> {
             .map(|tile| (self.part(&means[0][tile], &means[1][tile]), tile))
             .collect();
         worst.sort_by(|a, b| b.0.abs().total_cmp(&a.0.abs()));
+        let exact = self.exact(worst.iter().map(|(_, tile)| *tile), &channels);
         worst.truncate(WORST);
         let named = worst.iter().map(|(part, tile)| {
             let (x, y) = (tile % across * TILE, tile / across * TILE);
@@ -129,18 +137,45 @@ impl Pair<'_> {
             "across": across,
             "channels": names,
             "shown": self.legend(&names, range),
-            "a": address(&shown(self.reference)?)?,
-            "b": address(&shown(self.other)?)?,
-            "error": address(&map([width, height], self.distance, Scale::FromZero, self.top)?)?,
+            "range": range.or((self.encoding == Encoding::Srgb).then_some([0.0, 1.0])),
+            "a": address(&shown(self.reference)?, EXACT)?,
+            "b": address(&shown(self.other)?, EXACT)?,
+            "exact": exact,
+            "error": address(&map([width, height], self.distance, Scale::FromZero, self.top)?, MAP)?,
             "error_label": self.label,
             "error_bar": bar(Scale::FromZero),
             "error_ends": ["0", short(self.top)],
-            "signed": address(&map([width, height], self.brighter, Scale::AboutZero, brightest)?)?,
+            "signed": address(&map([width, height], self.brighter, Scale::AboutZero, brightest)?, MAP)?,
             "signed_bar": bar(Scale::AboutZero),
             "signed_ends": [format!("-{percent}"), format!("+{percent}")],
             "means": means,
             "worst": named.collect::<Value>(),
         }))
+    }
+
+    /// The pixels of tiles as numbers of half precision, for as many of them as there is room for: tile by tile, each row by
+    /// row, and of each pixel the channels of the reference, then those of the other.
+    fn exact(&self, order: impl Iterator<Item = usize>, channels: &[usize]) -> Value {
+        let (width, height) = (self.reference.width(), self.reference.height());
+        let across = (width as usize).div_ceil(TILE) as u32;
+        let side = TILE as u32;
+        let (mut tiles, mut bytes) = (Vec::new(), Vec::new());
+        for tile in order {
+            let (x, y) = (tile as u32 % across * side, tile as u32 / across * side);
+            let (right, bottom) = ((x + side).min(width), (y + side).min(height));
+            let pixels = (right - x) as usize * (bottom - y) as usize;
+            if bytes.len() + 4 * pixels * channels.len() > MOST_EXACT {
+                break;
+            }
+            tiles.push(tile);
+            for (x, y) in (y..bottom).flat_map(|y| (x..right).map(move |x| (x, y))) {
+                for image in [self.reference, self.other] {
+                    let values = channels.iter().map(|&c| f16::from_f32(image.get(x, y, c)));
+                    bytes.extend(values.flat_map(f16::to_le_bytes));
+                }
+            }
+        }
+        json!({ "tiles": tiles, "values": BASE64_STANDARD.encode(bytes) })
     }
 
     /// What is told in numbers: red, green and blue, or the first three of other channels.
@@ -290,8 +325,8 @@ fn bar(scale: Scale) -> String {
 }
 
 /// The picture as an address that holds it.
-fn address(codes: &Codes) -> Result<String> {
-    let bytes = BASE64_STANDARD.encode(codes.to_jpeg()?);
+fn address(codes: &Codes, quality: u8) -> Result<String> {
+    let bytes = BASE64_STANDARD.encode(codes.to_jpeg_of(quality)?);
     Ok(format!("data:image/jpeg;base64,{bytes}"))
 }
 
@@ -348,12 +383,53 @@ mod tests {
         assert_eq!(scene["name"], "</script><b>");
         assert_eq!(scene["pictures"]["worst"][0][2], "+1.00 %");
         assert_eq!(scene["pictures"]["means"][1][3][0], 0.505);
+        // All tiles fit, so that every pixel is there.
+        let exact = &scene["pictures"]["exact"];
+        assert_eq!(exact["tiles"].as_array().unwrap().len(), 4);
+        let values = BASE64_STANDARD.decode(exact["values"].as_str().unwrap());
+        let values = values.unwrap();
+        let pixels = values.as_chunks::<12>().0;
+        assert_eq!(pixels.len(), 20 * 17);
+        for pixel in pixels {
+            let values = pixel.as_chunks().0.iter().map(|b| f16::from_le_bytes(*b));
+            let rounded = [0.5, 0.5, 0.5, 0.505, 0.505, 0.505].map(f16::from_f32);
+            assert!(values.eq(rounded), "{pixel:?}");
+        }
         for picture in ["a", "b", "error", "signed"] {
             let jpeg = scene["pictures"][picture].as_str().unwrap();
             assert!(jpeg.starts_with("data:image/jpeg;base64,/9j/"), "{jpeg}");
         }
         assert_eq!(scene["pictures"]["error_ends"][1], "1.26");
         assert_eq!(scene["pictures"]["signed_ends"][0], "-1.00 %");
+    }
+
+    #[test]
+    fn exact_values_are_those_of_the_tiles_that_differ_most_and_have_a_limit() {
+        let names = ["R", "G", "B"].map(str::to_owned).to_vec();
+        let (width, height) = (640, 360);
+        let data = vec![0.5; width * height * 3];
+        let a = Image::from_data(width as u32, height as u32, names, data).unwrap();
+        let mut b = a.clone();
+        b.set(600, 359, 1, 70.0);
+        let pair = Pair {
+            distance: &vec![0.0; width * height],
+            brighter: &vec![0.0; width * height],
+            ..pair(&a, &b, Some([0, 1, 2]))
+        };
+        let object = pair.object().unwrap();
+        let exact = &object["exact"];
+        let tiles = exact["tiles"].as_array().unwrap();
+        assert_eq!(tiles[0], 22 * 40 + 37);
+        let bytes = BASE64_STANDARD.decode(exact["values"].as_str().unwrap());
+        let bytes = bytes.unwrap();
+        assert!((MOST_EXACT - 12 * 256..=MOST_EXACT).contains(&bytes.len()));
+        // The tile is 16 by 8, and the pixel the ninth of its last row.
+        let at = 12 * (7 * 16 + 8) + 2 * 4;
+        assert_eq!(
+            f16::from_le_bytes([bytes[at], bytes[at + 1]]).to_f32(),
+            70.0
+        );
+        assert!(tiles.len() < 40 * 23);
     }
 
     #[test]

@@ -193,7 +193,14 @@ impl<T: Code> Codes<T> {
     /// # Errors
     /// Where codes have 16 bits.
     pub fn to_jpeg(&self) -> Result<Vec<u8>> {
-        const QUALITY: u8 = 95;
+        self.to_jpeg_of(95)
+    }
+
+    /// The same of a quality from 1 to 100.
+    ///
+    /// # Errors
+    /// Where codes have 16 bits.
+    pub fn to_jpeg_of(&self, quality: u8) -> Result<Vec<u8>> {
         if size_of::<T>() != 1 {
             return Err(only_eight());
         }
@@ -208,7 +215,7 @@ impl<T: Code> Codes<T> {
             .copied()
             .collect();
         Encoder::new(&kept, self.width as usize, self.height as usize, format)
-            .quality(QUALITY)
+            .quality(quality)
             .subsampling(Subsampling::S444)
             .encode()
             .map_err(|e| Error::input(format!("the image cannot be stored as JPEG: {e}")))
