@@ -94,6 +94,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         };
         if !arguments.quiet && !arguments.json {
             let (n, name, all) = (i + 1, unit.item.output.display(), manifest.units.len());
+            // Why is told by the process, and at the end.
+            let ended = match ended.status {
+                Status::Failed => ended.status.name().to_owned(),
+                _ => ended.to_string(),
+            };
             output::line(&format!("{n} of {all}: {name}: {ended}"));
         }
         done.push(ended);

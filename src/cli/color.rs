@@ -172,6 +172,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
                 .filter_map(|name| Some((name.as_str(), display::gamut(name)?)))
                 .collect();
             output::write_svg(output, &diagram::chromaticities(&gamuts, &points))?;
+            output::line(&format!("{}: the chromaticity diagram", output.display()));
         }
     }
     Ok(status::DONE)

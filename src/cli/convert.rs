@@ -69,13 +69,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         image::check_writable(output)?;
         arguments.display.transform().check(output)?;
     }
-    if let Some(unused) = arguments
-        .display
-        .unused(outputs.iter().map(PathBuf::as_path))
-        && !arguments.quiet
-    {
-        report::warnings(unused.problems());
-    }
+    let paths = outputs.iter().map(PathBuf::as_path);
+    arguments.display.warn_unused(paths, arguments.quiet);
     let denoiser = arguments.denoising.denoiser(0)?;
     if let Some(columns) = arguments.sheet {
         let images: Result<Vec<Image>> = arguments

@@ -87,11 +87,8 @@ Examples:
 pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     image::check_writable(&arguments.output)?;
     arguments.display.transform().check(&arguments.output)?;
-    if let Some(unused) = arguments.display.unused([arguments.output.as_path()])
-        && !arguments.quiet
-    {
-        report::warnings(unused.problems());
-    }
+    let output = arguments.output.as_path();
+    arguments.display.warn_unused([output], arguments.quiet);
     let denoiser = arguments.library.denoiser(0)?;
     let picture = image::read(&arguments.input, &arguments.memory.budget().open())?;
     if !arguments.quiet {

@@ -9,7 +9,7 @@ use etendue::display::{
 use etendue::error::Error;
 use etendue::image::Format;
 
-use super::parse;
+use super::{parse, report};
 
 /// How pictures for a screen are made of linear values.
 #[derive(Args, Debug)]
@@ -88,6 +88,15 @@ impl DisplayArguments {
         }
     }
 
+    /// Warns where they are given, and none of the outputs is a picture for a screen; unless `quiet`.
+    pub(super) fn warn_unused<'a>(&self, outputs: impl IntoIterator<Item = &'a Path>, quiet: bool) {
+        if let Some(unused) = self.unused(outputs)
+            && !quiet
+        {
+            report::warnings(unused.problems());
+        }
+    }
+
     /// What to say where they are given, and none of the outputs is a picture for a screen.
     pub(super) fn unused<'a>(&self, outputs: impl IntoIterator<Item = &'a Path>) -> Option<Error> {
         let asked = DisplayTransform {
@@ -149,18 +158,22 @@ enum Modes {
 
 /// An illuminance.
 fn lux(text: &str) -> Result<f32, String> {
-    /// More than the sun's.
-    const MOST: f32 = 1e6;
-    let lux: Option<f32> = text.parse().ok();
-    let lux = lux.filter(|lux| (0.0..=MOST).contains(lux));
-    lux.ok_or_else(|| format!("write lux from 0 to {MOST}, such as 500 for an office"))
+    light(text, 0.0)
+        .ok_or_else(|| format!("write lux from 0 to {BRIGHTEST}, such as 500 for an office"))
 }
 
 /// A display's luminance.
 fn nits(text: &str) -> Result<f32, String> {
-    let nits: Option<f32> = text.parse().ok();
-    let nits = nits.filter(|nits| (0.1..=1e6).contains(nits));
-    nits.ok_or_else(|| "write cd/m² from 0.1 to 1000000".to_owned())
+    light(text, 0.1).ok_or_else(|| format!("write cd/m² from 0.1 to {BRIGHTEST}"))
+}
+
+/// More than the sun's illuminance in lux, and than any display's luminance in cd/m².
+const BRIGHTEST: f32 = 1e6;
+
+/// A number from the least to [`BRIGHTEST`].
+fn light(text: &str, least: f32) -> Option<f32> {
+    let light = text.parse().ok()?;
+    (least..=BRIGHTEST).contains(&light).then_some(light)
 }
 
 /// A number of stops, or `auto`.

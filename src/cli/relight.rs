@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 
 use super::display::DisplayArguments;
 use super::memory::MemoryArguments;
-use super::{output, parse, report, status};
+use super::{output, parse, status};
 
 /// Weight the layers of an image anew, without tracing
 ///
@@ -45,9 +45,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     if let Some(output) = &arguments.output {
         image::check_writable(output)?;
         arguments.display.transform().check(output)?;
-        if let Some(unused) = arguments.display.unused([output.as_path()]) {
-            report::warnings(unused.problems());
-        }
+        arguments.display.warn_unused([output.as_path()], false);
         let relit = relight::relight(&image, &arguments.weights).map_err(of_input)?;
         let mut metadata = Metadata::default()
             .with("software", concat!("etendue ", env!("CARGO_PKG_VERSION")))

@@ -153,6 +153,7 @@ fn metamers_displays_and_diagrams_are_told_from_files() {
         ],
     );
     assert!(drawn.status.success(), "{drawn:?}");
+    assert!(drawn.stdout.starts_with(b"d.svg: "), "{drawn:?}");
     assert!(
         fs::read_to_string(folder.path().join("d.svg"))
             .unwrap()

@@ -1,6 +1,6 @@
 //! How a bare mesh is shown: what the command line can ask for, and the parts of the scene that say it.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use glam::{DVec3, Vec3};
 
@@ -182,12 +182,9 @@ impl Staging {
     /// The mesh's material, around its colour, a `<rgb>` or `<texture>` of this name that `color` makes; `None` of a mesh
     /// without colours of its own. Nothing where it comes from a file.
     pub(super) fn material(&self, color: impl Fn(&str) -> Option<String>) -> String {
-        let picture = |path: &PathBuf| {
-            let path = std::path::absolute(path).unwrap_or_else(|_| path.clone());
-            let path = escaped(&path.to_string_lossy());
-            format!(
-                r#"<texture name="reflectance" type="bitmap"><string name="filename" value="{path}"/></texture>"#
-            )
+        let picture = |path: &Path| {
+            let file = filename(path);
+            format!(r#"<texture name="reflectance" type="bitmap">{file}</texture>"#)
         };
         let clay = |name: &str| {
             let [r, g, b] = crate::mesh::BARE_COLOR;
@@ -269,8 +266,7 @@ impl Staging {
             }
             Lighting::Sky => sky([0.9, 0.95, 1.0]),
             Lighting::Environment(path) => {
-                let path = std::path::absolute(path).unwrap_or_else(|_| path.clone());
-                let path = escaped(&path.to_string_lossy());
+                let file = filename(path);
                 // Images of all around have y up.
                 let turn = match self.up {
                     UpAxis::Y => "",
@@ -278,12 +274,17 @@ impl Staging {
                         r#"<transform name="to_world"><rotate x="1" angle="90"/></transform>"#
                     }
                 };
-                format!(
-                    r#"<emitter type="envmap"><string name="filename" value="{path}"/>{turn}</emitter>"#
-                )
+                format!(r#"<emitter type="envmap">{file}{turn}</emitter>"#)
             }
         }
     }
+}
+
+/// An image's file as a scene file has it, wherever that stands.
+fn filename(path: &Path) -> String {
+    let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    let path = escaped(&path.to_string_lossy());
+    format!(r#"<string name="filename" value="{path}"/>"#)
 }
 
 /// A point as a scene file has it.
