@@ -1,5 +1,6 @@
 //! Rays, hits and what a hit looks like to a material: the small types that the layers above pass around.
 
+mod cone;
 pub mod offset;
 mod points;
 
@@ -8,6 +9,7 @@ use glam::{Vec2, Vec3};
 use crate::math::{Frame, Transform};
 use crate::mesh::Mesh;
 
+pub use cone::Cone;
 pub use points::{Points, ShadowRays, Source};
 
 /// Half a line: points `origin + t·direction` for t in (0, `t_max`].
@@ -105,6 +107,9 @@ pub struct Interaction<'s> {
     pub dp_du: Vec3,
     /// See `dp_du`.
     pub dp_dv: Vec3,
+    /// By how much texture coordinates differ over what the ray stands for: an ellipse's conjugate diameters; 0 where
+    /// nobody has asked.
+    pub footprint: [Vec2; 2],
     /// Toward where the ray came from, in the shading frame.
     pub wi: Vec3,
     /// Absolute time.
@@ -131,6 +136,7 @@ impl Interaction<'_> {
             uv,
             dp_du: Vec3::X,
             dp_dv: Vec3::Y,
+            footprint: [Vec2::ZERO; 2],
             wi: Vec3::Z,
             time: 0.0,
             shape: Hit::NONE,

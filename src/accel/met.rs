@@ -73,6 +73,7 @@ impl Met<'_> {
             uv: surface.uv,
             dp_du: surface.dp_du,
             dp_dv: surface.dp_dv,
+            footprint: [lanes::Vec2::splat(0.0); 2],
             wi: frame.to_local(-self.directions()),
             source: self,
         };

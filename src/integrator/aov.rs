@@ -194,6 +194,7 @@ impl<C: ColorModel> Estimator<C> for Aov<C> {
         if let Some((first, _)) = children.first_mut() {
             estimates.splats.append(&mut first.splats);
         }
+        let footprint = self.footprint.as_ref().filter(|_| scene.has_mipmaps());
         let mut developed = vec![0.0; scene.color().channels().len()];
         for (i, (start, hit)) in starts.iter().zip(&hits).enumerate() {
             let nothing = Estimate {
@@ -218,7 +219,13 @@ impl<C: ColorModel> Estimator<C> for Aov<C> {
                     estimates.extra.push(*alpha);
                 }
             }
-            let at = (!hit.is_miss()).then(|| scene.interaction(&start.ray, hit));
+            let at = (!hit.is_miss()).then(|| {
+                let at = scene.interaction(&start.ray, hit);
+                match footprint {
+                    Some(footprint) => footprint.seen(&start.ray, at),
+                    None => at,
+                }
+            });
             for (_, quantity, suffixes) in &self.quantities {
                 let values = at
                     .as_ref()

@@ -13,7 +13,7 @@ use super::light_paths::LightPaths;
 use super::limits::{self, Limits};
 use super::mis::power_of_three;
 use super::wave::{Block, Contribution, Outcome, Shading, Walker, Wave, Ways};
-use super::{Context, Cost, Estimate, Estimates, Estimator, Start};
+use super::{Context, Cost, Estimate, Estimates, Estimator, Footprint, Start};
 use crate::color::ColorModel;
 use crate::description::Properties;
 use crate::description::declared::Plugin;
@@ -29,6 +29,7 @@ pub struct Bdpt {
     limits: Limits,
     hide_emitters: bool,
     lens: Lens,
+    footprint: Option<Footprint>,
 }
 
 /// A bounce decides on a light and on the way on.
@@ -53,6 +54,7 @@ impl Bdpt {
             limits: Limits::build(properties)?,
             hide_emitters: properties.boolean("hide_emitters")?,
             lens: Lens::wanted(properties, context)?,
+            footprint: context.footprint.clone(),
         })
     }
 }
@@ -74,7 +76,8 @@ impl<C: ColorModel> Estimator<C> for Bdpt {
         values.clear();
         values.resize(starts.len(), self.limits.start(scene, self.hide_emitters));
         let ball = scene.ball();
-        let mut wave = Wave::carrying(scene, sampler, starts, |_, _| 0.0);
+        let wave = Wave::carrying(scene, sampler, starts, |_, _| 0.0);
+        let mut wave = wave.with_cones(self.footprint.as_ref());
         for depth in 0..self.limits.max_depth {
             if wave.is_over() {
                 break;

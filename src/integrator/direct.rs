@@ -7,7 +7,7 @@ use super::bounce::Bounces;
 use super::limits;
 use super::mis::power;
 use super::wave::{Block, Contribution, Outcome, Shading, Wave, Ways};
-use super::{Context, Cost, Estimate, Estimates, Estimator, Start};
+use super::{Context, Cost, Estimate, Estimates, Estimator, Footprint, Start};
 use crate::color::{ColorModel, Spectral as _};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, integer};
@@ -17,11 +17,12 @@ use crate::sampler::Sampler;
 use crate::scene::Scene;
 
 /// The settings.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Direct {
     emitter_samples: u32,
     bsdf_samples: u32,
     hide_emitters: bool,
+    footprint: Option<Footprint>,
 }
 
 /// About how many samples of a kind are in memory at once.
@@ -52,7 +53,7 @@ impl Direct {
         ],
     };
 
-    pub(super) fn build(properties: &Properties<'_>, _context: &Context) -> Result<Self> {
+    pub(super) fn build(properties: &Properties<'_>, context: &Context) -> Result<Self> {
         let shading = properties.integer("shading_samples")?;
         let count = |name| -> Result<u32> { Ok(properties.given(name)?.unwrap_or(shading) as u32) };
         if properties.has("shading_samples") {
@@ -77,6 +78,7 @@ impl Direct {
             emitter_samples,
             bsdf_samples,
             hide_emitters,
+            footprint: context.footprint.clone(),
         })
     }
 
@@ -106,7 +108,8 @@ impl<C: ColorModel> Estimator<C> for Direct {
         let together = (SAMPLES / most).max(MAX_LANES);
         let parts = starts.chunks(together);
         for (starts, estimates) in parts.zip(estimates.values.chunks_mut(together)) {
-            self.estimate_part(Wave::new(scene, sampler, starts), estimates, cost);
+            let wave = Wave::new(scene, sampler, starts).with_cones(self.footprint.as_ref());
+            self.estimate_part(wave, estimates, cost);
         }
     }
 }

@@ -4,7 +4,7 @@
 
 use glam::{DVec3, Vec2, Vec3};
 
-use crate::interaction::{Interaction, Ray};
+use crate::interaction::{Cone, Interaction, Ray};
 use crate::sensor::{Film, Sensor};
 
 /// The camera, and how far apart its rays are.
@@ -13,6 +13,8 @@ pub struct Footprint {
     sensor: Sensor,
     /// In units of the film.
     step: Vec2,
+    /// Of a pixel's side.
+    share: f32,
     /// Of the film in pixels.
     size: Vec2,
 }
@@ -24,8 +26,33 @@ impl Footprint {
         Self {
             sensor,
             step: size.recip() / (samples as f32).sqrt(),
+            share: 1.0 / (samples as f32).sqrt(),
             size,
         }
+    }
+
+    /// The cone around a ray of the camera's: its circle is as large as what lies between the ray and its neighbours.
+    pub(super) fn cone(&self, ray: &Ray) -> Cone {
+        let [right, down] = self.sensor.neighbours(ray, self.step);
+        let across = |a: Vec3, b: Vec3| a.cross(b).length().sqrt();
+        Cone {
+            width: across(right.origin - ray.origin, down.origin - ray.origin),
+            spread: across(
+                right.direction - ray.direction,
+                down.direction - ray.direction,
+            ),
+        }
+    }
+
+    /// A point that a ray of the camera's has met, as textures see it.
+    pub(super) fn seen<'s>(&self, ray: &Ray, at: Interaction<'s>) -> Interaction<'s> {
+        let width = self.cone(ray).at(at.t);
+        at.seen_within(width)
+    }
+
+    /// How much of what a pixel's samples cover together one of them stands for, as a length.
+    pub(super) fn share(&self) -> f32 {
+        self.share
     }
 
     /// By how many pixels, to the right and down, what is at `position` at a time is displaced over the film while the

@@ -20,6 +20,7 @@ mod volpathmis;
 
 mod arrival;
 mod bounce;
+mod cones;
 mod footprint;
 mod layers;
 mod lens;
@@ -162,10 +163,10 @@ family! {
     }
 }
 
-impl<C: ColorModel> Default for Integrator<C> {
-    /// Mitsuba's: `path` without a limit.
-    fn default() -> Self {
-        Self::Path(path::Path::default())
+impl<C: ColorModel> Integrator<C> {
+    /// Mitsuba's where a scene has none: `path` without a limit.
+    pub fn preset(context: &Context) -> Self {
+        Self::Path(path::Path::seen_by(context.footprint.clone()))
     }
 }
 

@@ -7,7 +7,7 @@ use super::bounce::Bounces;
 use super::limits::{self, Limits};
 use super::mis::power;
 use super::wave::{Block, Contribution, Outcome, Shading, Wave, Ways};
-use super::{Context, Cost, Estimate, Estimates, Estimator, Start};
+use super::{Context, Cost, Estimate, Estimates, Estimator, Footprint, Start};
 use crate::color::ColorModel;
 use crate::description::Properties;
 use crate::description::declared::Plugin;
@@ -17,10 +17,11 @@ use crate::sampler::Sampler;
 use crate::scene::Scene;
 
 /// The path tracer's settings.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Path {
     limits: Limits,
     hide_emitters: bool,
+    footprint: Option<Footprint>,
 }
 
 /// A bounce decides on a light and on the way on.
@@ -36,10 +37,19 @@ impl Path {
         properties: &[limits::COMMON, limits::LIMITS],
     };
 
-    pub(super) fn build(properties: &Properties<'_>, _context: &Context) -> Result<Self> {
+    /// Mitsuba's, without a limit, seen by a camera.
+    pub(super) fn seen_by(footprint: Option<Footprint>) -> Self {
+        Self {
+            footprint,
+            ..Self::default()
+        }
+    }
+
+    pub(super) fn build(properties: &Properties<'_>, context: &Context) -> Result<Self> {
         Ok(Self {
             limits: Limits::build(properties)?,
             hide_emitters: properties.boolean("hide_emitters")?,
+            footprint: context.footprint.clone(),
         })
     }
 }
@@ -56,7 +66,7 @@ impl<C: ColorModel> Estimator<C> for Path {
         let estimates = &mut estimates.values;
         estimates.clear();
         estimates.resize(starts.len(), self.limits.start(scene, self.hide_emitters));
-        let mut wave = Wave::new(scene, sampler, starts);
+        let mut wave = Wave::new(scene, sampler, starts).with_cones(self.footprint.as_ref());
         for depth in 0..self.limits.max_depth {
             if wave.is_over() {
                 break;

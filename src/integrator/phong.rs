@@ -16,7 +16,7 @@ use super::bounce::Bounces;
 use super::layers::{Layers, Term};
 use super::limits::{self, Limits};
 use super::wave::{Block, Outcome, Shading, Wave, Ways};
-use super::{Context, Cost, Estimate, Estimates, Estimator, Start};
+use super::{Context, Cost, Estimate, Estimates, Estimator, Footprint, Start};
 use crate::color::{ColorModel, Spectra as _, Spectral};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, boolean, choice, string};
@@ -33,6 +33,7 @@ pub struct Phong {
     falloff: Falloff,
     shadows: bool,
     layers: Layers,
+    footprint: Option<Footprint>,
 }
 
 /// How light fades on its way.
@@ -130,6 +131,7 @@ impl Phong {
             falloff,
             shadows: properties.boolean("shadows")?,
             layers: Layers::build(properties, &context.lights)?,
+            footprint: context.footprint.clone(),
         })
     }
 }
@@ -165,7 +167,7 @@ impl<C: ColorModel> Estimator<C> for Phong {
         let bounces = Bounces {
             decisions: lights + 1,
         };
-        let mut wave = Wave::new(scene, sampler, starts);
+        let mut wave = Wave::new(scene, sampler, starts).with_cones(self.footprint.as_ref());
         for depth in 0..self.limits.max_depth {
             if wave.is_over() {
                 break;

@@ -9,7 +9,7 @@
 //! find what is seen, and shadow rays are asked; what is shaded is the same.
 
 use super::limits;
-use super::{Context, Cost, Estimate, Estimates, Estimator, Start};
+use super::{Context, Cost, Estimate, Estimates, Estimator, Footprint, Start};
 use crate::color::ColorModel;
 use crate::description::Properties;
 use crate::description::declared::{Plugin, boolean, choice, float, integer};
@@ -22,12 +22,13 @@ use crate::sampler::Sampler;
 use crate::scene::Scene;
 
 /// The settings.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Raster {
     pub(crate) shade: ShadeSettings,
     pub(crate) pattern: Pattern,
     pub(crate) depth: DepthFormat,
     pub(crate) cull: Cull,
+    footprint: Option<Footprint>,
 }
 
 impl Raster {
@@ -87,7 +88,7 @@ impl Raster {
         ],
     };
 
-    pub(super) fn build(properties: &Properties<'_>, _context: &Context) -> Result<Self> {
+    pub(super) fn build(properties: &Properties<'_>, context: &Context) -> Result<Self> {
         let count = properties.integer("multisamples")? as u32;
         let Some(pattern) = Pattern::of(count) else {
             let message = format!("there is no pattern of {count} samples");
@@ -123,6 +124,7 @@ impl Raster {
                 "front" => Cull::Front,
                 _ => Cull::None,
             },
+            footprint: context.footprint.clone(),
         })
     }
 
@@ -142,6 +144,7 @@ impl Raster {
             pattern: Pattern::CENTRE,
             depth: DepthFormat::Float,
             cull: Cull::None,
+            footprint: None,
         }
     }
 }
@@ -161,6 +164,7 @@ impl<C: ColorModel> Estimator<C> for Raster {
         estimates.values.clear();
         estimates.extra.clear();
         let mut blocked = Vec::new();
+        let footprint = self.footprint.as_ref().filter(|_| scene.has_mipmaps());
         for (start, hit) in starts.iter().zip(&hits) {
             let time = start.ray.time;
             let shader = Shader::new(scene, self.shade, start.wavelengths, time);
@@ -168,7 +172,11 @@ impl<C: ColorModel> Estimator<C> for Raster {
                 let (radiance, alpha) = shader.background(&start.ray);
                 Estimate { radiance, alpha }
             } else {
-                let radiance = shader.hit(&start.ray, hit, |at, sample| {
+                let mut at = scene.interaction(&start.ray, hit);
+                if let Some(footprint) = footprint {
+                    at = footprint.seen(&start.ray, at);
+                }
+                let radiance = shader.met(&start.ray, at, |at, sample| {
                     let target = sample.target.unwrap_or_default();
                     let distant = sample.target.is_none();
                     let shadow =

@@ -15,7 +15,7 @@ use crate::sampler::Sampler;
 use crate::scene::Scene;
 
 /// The volumetric path tracer's settings.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct VolPath(Volumetric);
 
 impl VolPath {

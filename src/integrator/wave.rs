@@ -8,8 +8,9 @@ use std::collections::HashMap;
 
 use super::arrival::{Arrival, Scattered, look_through_emitters};
 use super::bounce::Decisions;
+use super::cones::Cones;
 use super::runs::Runs;
-use super::{Cost, Estimate, Start};
+use super::{Cost, Estimate, Footprint, Start};
 use crate::accel::Met;
 use crate::color::{ColorModel, Spectra as _, Spectral};
 use crate::interaction::{Hit, Points, Ray, ShadowRays};
@@ -180,6 +181,7 @@ pub(super) struct Ways<F: Lanes, S> {
 pub(super) struct Outcome<'a, C: ColorModel, T, M = ()> {
     pub(super) shadows: &'a mut WithRays<T>,
     pub(super) next: &'a mut WithRays<Walker<C, M>>,
+    pub(super) cones: &'a mut Cones,
 }
 
 impl<C: ColorModel, T, M: Copy> Outcome<'_, C, T, M> {
@@ -259,6 +261,10 @@ impl<C: ColorModel, T, M: Copy> Outcome<'_, C, T, M> {
                 ..*block.walker(lane)
             };
             change(lane, direction, &mut walker);
+            if self.cones.are_told() {
+                let pdf = scattered.map(|scattered| scattered.pdf);
+                self.cones.scatter(walker.slot, block.hit(lane).t, pdf);
+            }
             self.next.push(ray, walker);
         }
     }
@@ -310,6 +316,7 @@ pub(super) struct Wave<'a, C: ColorModel, T: 'static, M: 'static = ()> {
     hits: Vec<Hit>,
     next: WithRays<Walker<C, M>>,
     shadows: WithRays<T>,
+    cones: Cones,
     blocked: Vec<bool>,
     /// Those that have met a surface, by material.
     runs: Runs,
@@ -393,9 +400,19 @@ impl<'a, C: ColorModel, T: 'static, M: Copy + 'static> Wave<'a, C, T, M> {
             hits,
             next,
             shadows,
+            cones: Cones::default(),
             blocked: Vec::new(),
             runs: Runs::new(scene.material_count()),
         }
+    }
+
+    /// The same, whose paths, which are at their starts, have cones by the camera's footprint where the scene has
+    /// textures that ask for them.
+    pub(super) fn with_cones(mut self, footprint: Option<&Footprint>) -> Self {
+        if let Some(footprint) = footprint.filter(|_| self.scene.has_mipmaps()) {
+            self.cones = Cones::of(footprint, &self.walkers.rays);
+        }
+        self
     }
 
     /// Whether no path is on its way.
@@ -438,6 +455,7 @@ impl<'a, C: ColorModel, T: 'static, M: Copy + 'static> Wave<'a, C, T, M> {
         let out = Outcome {
             shadows: &mut self.shadows,
             next: &mut self.next,
+            cones: &mut self.cones,
         };
         act(&mut self.walkers, &self.hits, out, goes_on);
         self.walkers.keep(goes_on);
@@ -463,7 +481,10 @@ impl<'a, C: ColorModel, T: 'static, M: Copy + 'static> Wave<'a, C, T, M> {
             if !brings_light {
                 continue;
             }
-            let at = (!hit.is_miss()).then(|| scene.interaction(ray, hit));
+            let at = (!hit.is_miss()).then(|| {
+                let at = scene.interaction(ray, hit);
+                self.cones.seen(walker.slot, at)
+            });
             let arrival = Arrival {
                 scene,
                 ray,
@@ -531,6 +552,7 @@ impl<'a, C: ColorModel, T: 'static, M: Copy + 'static> Wave<'a, C, T, M> {
                 out: Outcome {
                     shadows: &mut self.shadows,
                     next: &mut self.next,
+                    cones: &mut self.cones,
                 },
             };
             C::run(scene.tracer().kernel(), blocks);
@@ -539,6 +561,7 @@ impl<'a, C: ColorModel, T: 'static, M: Copy + 'static> Wave<'a, C, T, M> {
             done = end;
         }
         std::mem::swap(&mut self.walkers, &mut self.next);
+        self.cones.advance();
     }
 }
 
@@ -579,10 +602,19 @@ impl<'a, C: ColorModel, M: Copy, S: Shading<C, M>, R: Iterator<Item = (usize, &'
                     indices,
                 };
                 let walkers = &self.walkers.things;
+                let mut at = met.points::<F>();
+                if self.out.cones.are_told() {
+                    let mut widths = F::ROW;
+                    for (lane, index) in indices.iter().enumerate() {
+                        let slot = walkers[*index as usize].slot;
+                        widths[lane] = self.out.cones.width(slot, met.hit(lane).t);
+                    }
+                    at.footprint = at.within(F::load(&widths));
+                }
                 let block = Block {
                     scene: self.scene,
                     material: self.scene.material_at(material),
-                    at: met.points::<F>(),
+                    at,
                     throughput: C::Columns::<F>::from_samples(|lane| match indices.get(lane) {
                         Some(index) => walkers[*index as usize].throughput,
                         None => C::Sample::zero(),

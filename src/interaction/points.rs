@@ -47,6 +47,8 @@ pub struct Points<'a, F: Lanes> {
     pub dp_du: Vec3<F>,
     /// How the position changes with v.
     pub dp_dv: Vec3<F>,
+    /// How far texture coordinates go over what the rays stand for: see [`Interaction::footprint`].
+    pub footprint: [Vec2<F>; 2],
     /// Toward where the paths came from, in the shading frame.
     pub wi: Vec3<F>,
     /// The same points one by one.
@@ -74,6 +76,7 @@ impl<'a> Points<'a, f32> {
             uv: at.uv.into(),
             dp_du: at.dp_du.into(),
             dp_dv: at.dp_dv.into(),
+            footprint: at.footprint.map(Vec2::from),
             wi: at.wi.into(),
             source: at,
         }
@@ -91,6 +94,7 @@ impl<F: Lanes> Points<'_, F> {
                 t: t.lane(lane),
                 n: n.lane(lane),
             },
+            footprint: self.footprint.map(|way| way.lane(lane)),
             wi: self.wi.lane(lane),
             ..self.source.interaction(lane)
         }

@@ -314,6 +314,7 @@ fn texture_point(position: Vec3, normal: Vec3, uv: Vec2) -> Interaction<'static>
         uv,
         dp_du: Vec3::ZERO,
         dp_dv: Vec3::ZERO,
+        footprint: [Vec2::ZERO; 2],
         wi: Vec3::Z,
         time: 0.0,
         shape: 0,

@@ -60,8 +60,13 @@ impl Bumps {
     #[inline(always)]
     fn slopes<F: Lanes>(&self, at: &Points<'_, F>) -> Vec2<F> {
         let (uv, mut slopes) = (at.uv.rows(), [F::ROW; 2]);
+        let footprint = [at.footprint[0].rows(), at.footprint[1].rows()];
         for lane in at.lanes() {
-            let gradient = self.height.gradient(&at.texture_point(lane, &uv), &());
+            let mut point = at.texture_point(lane, &uv);
+            for (way, rows) in point.footprint.iter_mut().zip(&footprint) {
+                *way = Vec2::<F>::of(rows, lane);
+            }
+            let gradient = self.height.gradient(&point, &());
             for (row, slope) in slopes.iter_mut().zip(gradient) {
                 row[lane] = slope[0];
             }

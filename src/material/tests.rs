@@ -740,6 +740,7 @@ impl Block<'_> {
             uv: self.vectors(|q| q.at.uv.extend(0.0)).xy(),
             dp_du: self.vectors(|q| q.at.dp_du),
             dp_dv: self.vectors(|q| q.at.dp_dv),
+            footprint: [0, 1].map(|i| self.vectors(|q| q.at.footprint[i].extend(0.0)).xy()),
             wi: self.vectors(|q| q.at.wi),
             source: self,
         }

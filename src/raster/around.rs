@@ -85,6 +85,7 @@ impl<C: ColorModel> Task for Lit<'_, C> {
             uv: lanes::Vec2::all(at.uv),
             dp_du: all(at.dp_du),
             dp_dv: all(at.dp_dv),
+            footprint: at.footprint.map(lanes::Vec2::all),
             wi: all(at.wi),
             source: at,
         };

@@ -29,6 +29,9 @@ pub struct Fragment {
     pub shading: Option<Vec3>,
     /// Texture coordinates.
     pub uv: Vec2,
+    /// How far to its side the neighbouring pixels look, to the right and down, world space: along their rays these are
+    /// points of the surface.
+    pub steps: [Vec3; 2],
     /// How far the place is from the triangle's nearest edge, in pixels.
     pub edge: f64,
     /// The triangle's corners, world space.
@@ -70,6 +73,7 @@ impl Fragment {
             normal: Vec3::ZERO,
             shading: None,
             uv: Vec2::ZERO,
+            steps: [Vec3::ZERO; 2],
             edge: f64::INFINITY,
             corners: corners.map(|corner| linear * corner + translation),
             weights,
@@ -110,6 +114,7 @@ impl Fragment {
             }
         };
         fragment.normal = normal_in_world(placed, local_normal);
+        fragment.steps = projection.steps(fragment.a).map(|step| step.as_vec3());
         fragment
     }
 

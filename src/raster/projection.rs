@@ -205,6 +205,12 @@ impl Projection {
         }
     }
 
+    /// By how much the points that far along their rays differ from a pixel to the next, to the right and down, world space.
+    pub fn steps(&self, a: f64) -> [DVec3; 2] {
+        let scale = if self.is_perspective { a } else { 1.0 };
+        [self.ways.x_axis * scale, self.ways.y_axis * scale]
+    }
+
     /// How large a pixel is at a place that far along its ray, in world units.
     pub fn pixel(&self, a: f64) -> f64 {
         let size = self.ways.x_axis.length().max(self.ways.y_axis.length());

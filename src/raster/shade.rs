@@ -1,7 +1,8 @@
 //! What fragments look like: the textbook's equation, I = I_a·k_a + Σ I_i·[k_d·max(0, L·N) + k_s·max(0, R·V)ⁿ], of the integrator
 //! `phong`, for each fragment (Phong) or for the corners of its triangle, between which colours are interpolated (Gouraud,
 //! *Continuous shading of curved surfaces*, 1971). Of area lights the middle shines. An environment shines from a few
-//! directions, without shadows, and mirrors show it and nothing else.
+//! directions, without shadows, and mirrors show it and nothing else. Textures with levels are looked up by how far the
+//! neighbouring pixels see texture coordinates change; at corners of triangles by the finest level.
 
 use std::f32::consts::FRAC_1_PI;
 
@@ -181,7 +182,11 @@ impl<'s, C: ColorModel> Shader<'s, C> {
     pub fn fragment(&self, ray: &Ray, fragment: &Fragment, is_perspective: bool) -> C::Sample {
         let hit = fragment.hit_of(ray);
         if self.settings.shading == Shading::Phong {
-            return self.point(ray, &hit, &mut |_, at, _, lamp| self.in_map(at, lamp));
+            let mut at = self.scene.interaction(ray, &hit);
+            if self.scene.has_mipmaps() {
+                at = at.seen_beside(-ray.direction, fragment.steps);
+            }
+            return self.point(ray, at, &mut |_, at, _, lamp| self.in_map(at, lamp));
         }
         let mut sum = C::Sample::zero();
         for (corner, weight) in fragment.weights.iter().enumerate() {
@@ -209,24 +214,23 @@ impl<'s, C: ColorModel> Shader<'s, C> {
                 v: at(2),
                 ..hit
             };
-            let color = self.point(&to_corner, &hit, &mut |_, at, _, lamp| {
-                self.in_map(at, lamp)
-            });
+            let at = self.scene.interaction(&to_corner, &hit);
+            let color = self.point(&to_corner, at, &mut |_, at, _, lamp| self.in_map(at, lamp));
             sum += color * *weight as f32;
         }
         sum
     }
 
-    /// A hit as rays find it, with `visible` for how much of a light, by its number, a point gets.
-    pub fn hit(
+    /// A point as rays find it, with `visible` for how much of a light a point gets.
+    pub fn met(
         &self,
         ray: &Ray,
-        hit: &Hit,
+        at: Interaction<'_>,
         mut visible: impl FnMut(&Interaction<'_>, &LightSample<C::Sample>) -> f32,
     ) -> C::Sample {
         self.point(
             ray,
-            hit,
+            at,
             &mut |_, at, sample, _| match self.settings.shadows {
                 Some(_) => visible(at, sample),
                 None => 1.0,
@@ -238,9 +242,8 @@ impl<'s, C: ColorModel> Shader<'s, C> {
         map.map_or(1.0, |map| map.lit(at.position, cosine))
     }
 
-    fn point(&self, ray: &Ray, hit: &Hit, visible: &mut Visible<'_, C>) -> C::Sample {
+    fn point(&self, ray: &Ray, at: Interaction<'_>, visible: &mut Visible<'_, C>) -> C::Sample {
         let (scene, w) = (self.scene, &self.wavelengths);
-        let at = scene.interaction(ray, hit);
         let material = scene.material(&at);
         let mut lit = C::Sample::zero();
         if let Some(ambient) = scene.ambient(&at, w) {

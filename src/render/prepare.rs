@@ -170,31 +170,31 @@ pub(super) fn view<C: ColorModel>(description: &Description, sensor: NodeId) -> 
         }
         None => Some(Sampler::default()),
     };
+    let context = integrator::Context {
+        lights: scene::light_names(description),
+        medium: properties
+            .child(Kind::Medium)?
+            .map(|medium| medium.node_id()),
+        lens: sensor
+            .as_ref()
+            .zip(film.as_ref())
+            .and_then(|(sensor, film)| Lens::new(sensor, film)),
+        footprint: sensor
+            .as_ref()
+            .filter(|sensor| sensor.is_projective())
+            .zip(film.as_ref())
+            .zip(sampler.as_ref())
+            .map(|((sensor, film), sampler)| {
+                Footprint::new(sensor.clone(), film, sampler.sample_count())
+            }),
+    };
     let (integrator, integrator_name) = match description.root().child(Kind::Integrator)? {
         Some(child) => {
-            let context = integrator::Context {
-                lights: scene::light_names(description),
-                medium: properties
-                    .child(Kind::Medium)?
-                    .map(|medium| medium.node_id()),
-                lens: sensor
-                    .as_ref()
-                    .zip(film.as_ref())
-                    .and_then(|(sensor, film)| Lens::new(sensor, film)),
-                footprint: sensor
-                    .as_ref()
-                    .filter(|sensor| sensor.is_projective())
-                    .zip(film.as_ref())
-                    .zip(sampler.as_ref())
-                    .map(|((sensor, film), sampler)| {
-                        Footprint::new(sensor.clone(), film, sampler.sample_count())
-                    }),
-            };
             let integrator = problems.take(Integrator::build(&child, &context));
             warnings.extend(problems.take(integrator::timeout_note(&child)).flatten());
             (integrator, child.plugin().to_owned())
         }
-        None => (Some(Integrator::default()), "path".to_owned()),
+        None => (Some(Integrator::preset(&context)), "path".to_owned()),
     };
     problems.finish()?;
     if integrator.as_ref().is_some_and(|i| !i.renders_media()) {

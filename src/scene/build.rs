@@ -343,6 +343,7 @@ pub fn build<C: ColorModel>(
     }
     builder.problems.finish()?;
     let warnings = builder.palettes.warnings();
+    let has_mipmaps = builder.palettes.have_mipmaps();
     let Builder {
         materials,
         lights,
@@ -377,6 +378,7 @@ pub fn build<C: ColorModel>(
         known_media,
         surfacing,
         has_passages,
+        has_mipmaps,
         warnings,
     })
 }

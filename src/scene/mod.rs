@@ -115,6 +115,8 @@ pub struct Scene<C: ColorModel> {
     surfacing: Vec<Surfacing>,
     /// Whether any shape's material lets light pass.
     has_passages: bool,
+    /// Whether any texture has an image's levels.
+    has_mipmaps: bool,
     warnings: Vec<Problem>,
 }
 
@@ -236,6 +238,11 @@ impl<C: ColorModel> Scene<C> {
     /// Whether there is any such surface.
     pub fn has_passages(&self) -> bool {
         self.has_passages
+    }
+
+    /// Whether any texture asks for [`Interaction::footprint`].
+    pub fn has_mipmaps(&self) -> bool {
+        self.has_mipmaps
     }
 
     /// The media on both sides of the surface that was hit, if it parts media.

@@ -194,6 +194,7 @@ impl Curves {
             uv: self.uv(segment, at),
             dp_du,
             dp_dv: (count * at.dp_dv).as_vec3(),
+            footprint: [Vec2::ZERO; 2],
             wi: frame.to_local(-ray.direction),
             time: ray.time,
             shape: hit.shape,

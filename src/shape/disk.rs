@@ -126,6 +126,7 @@ impl Surface for Disk {
             uv: Self::polar(p),
             dp_du,
             dp_dv: TAU * (y * p.x - x * p.y),
+            footprint: [Vec2::ZERO; 2],
             wi: frame.to_local(-ray.direction),
             time: ray.time,
             shape: hit.shape,

@@ -242,6 +242,7 @@ impl Surface for Ellipsoids {
             uv,
             dp_du,
             dp_dv,
+            footprint: [Vec2::ZERO; 2],
             wi: frame.to_local(-ray.direction),
             time: ray.time,
             shape: hit.shape,

@@ -241,6 +241,7 @@ impl Surface for Frustum {
             uv: unrolled(around, height),
             dp_du,
             dp_dv: up.as_vec3(),
+            footprint: [Vec2::ZERO; 2],
             wi: frame.to_local(-ray.direction),
             time: ray.time,
             shape: hit.shape,

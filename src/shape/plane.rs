@@ -95,6 +95,7 @@ impl Surface for Plane {
             uv: (0.5 * (p + 1.0)).as_vec2(),
             dp_du,
             dp_dv,
+            footprint: [Vec2::ZERO; 2],
             wi: frame.to_local(-ray.direction),
             time: ray.time,
             shape: hit.shape,

@@ -408,6 +408,7 @@ impl Surface for SdfGrid {
             uv: Vec2::ZERO,
             dp_du: Vec3::ZERO,
             dp_dv: Vec3::ZERO,
+            footprint: [Vec2::ZERO; 2],
             wi: frame.to_local(-ray.direction),
             time: ray.time,
             shape: hit.shape,

@@ -254,6 +254,7 @@ impl Surface for Sphere {
             uv: self.angles(outward),
             dp_du,
             dp_dv,
+            footprint: [Vec2::ZERO; 2],
             wi: frame.to_local(-ray.direction),
             time: ray.time,
             shape: hit.shape,

@@ -1,27 +1,36 @@
 //! `bitmap`: an image file over texture coordinates, (0, 0) at the upper left corner of the image and v
-//! downwards. `filter_type` is bilinear or nearest, `wrap_mode` repeat, mirror or clamp; 8- and 16-bit
+//! downwards. `filter_type` is bilinear or nearest, or one of Étendue's own: `trilinear`, between levels of the image that are
+//! each half as large, by how much of it what a ray stands for covers ([`super::pyramid`]); and `anisotropic`, by up to
+//! `max_anisotropy` such looks along what is covered where that is longer than wide ([`super::probes`]). Where nobody knows what a
+//! ray stands for, these two are bilinear. `wrap_mode` is repeat, mirror or clamp; 8- and 16-bit
 //! files are decoded from sRGB unless `raw` says that they hold numbers; alpha is dropped. In bands, as in Mitsuba's
 //! spectral variants, colours become the spectra of reflectances whatever they stand for: as light they are clamped to
 //! [0, 1] and have no illuminant, unless a `d65` holds the bitmap.
 
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 
 use glam::{Mat3, Vec2};
 
-use super::{Palette, Pattern, Picture, to_uv, transformed};
+use super::probes::{Probes, Shape};
+use super::pyramid::{Mipmap, Pyramid};
+use super::{Palette, Pattern, Picture, TexelKey, to_uv, transformed};
 use crate::budget::Budget;
 use crate::color::{ColorModel, Role, Spectra, Spectral};
 use crate::description::Properties;
-use crate::description::declared::{Plugin, boolean, choice, file, string};
+use crate::description::declared::{Plugin, boolean, choice, file, integer, string};
+use crate::description::properties::STRICT;
 use crate::error::Result;
 use crate::interaction::Interaction;
-use crate::lanes::{self, Ints, Lanes};
+use crate::lanes::{self, Call, Ints, Lanes};
 
 /// An image whose texels are ready to be evaluated, row by row from the top.
 #[derive(Debug)]
 pub(super) struct Texels<C: ColorModel> {
     size: [usize; 2],
     texels: C::Texels,
+    /// Where that was asked for, and the image has more than a texel.
+    pyramid: Option<Pyramid<C>>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -55,6 +64,20 @@ impl Wrap {
         };
         wrapped.clamp(0.0, last).to_int()
     }
+
+    /// The same of as many texels as each lane says.
+    #[inline(always)]
+    pub(super) fn apply_each<F: Lanes>(self, i: F, n: F) -> F::Int {
+        let wrapped = match self {
+            Self::Repeat => modulo(i, n),
+            Self::Clamp => i,
+            Self::Mirror => {
+                let i = modulo(i, n + n);
+                i.min(n + n - F::one() - i)
+            }
+        };
+        wrapped.max(F::zero()).min(n - F::one()).to_int()
+    }
 }
 
 /// A texture from an image.
@@ -62,6 +85,8 @@ impl Wrap {
 pub struct Bitmap<C: ColorModel> {
     texels: Arc<Texels<C>>,
     nearest: bool,
+    /// How what is seen of the image is looked up in its levels, if it has any.
+    shape: Shape,
     wrap: Wrap,
     to_uv: Mat3,
 }
@@ -82,9 +107,16 @@ impl<C: ColorModel> Bitmap<C> {
             file("filename", "the image"),
             choice(
                 "filter_type",
-                &["bilinear", "nearest"],
-                "how texels are looked up",
+                &["bilinear", "nearest", "trilinear", "anisotropic"],
+                "how texels are looked up; the last two, of smaller images where it is far away, are Étendue's own",
             ),
+            integer(
+                "max_anisotropy",
+                16,
+                "the most looks of filter_type anisotropic",
+            )
+            .between(1.0, 256.0)
+            .own(),
             choice(
                 "wrap_mode",
                 &["repeat", "mirror", "clamp"],
@@ -102,7 +134,17 @@ impl<C: ColorModel> Bitmap<C> {
     };
 
     pub(super) fn build(properties: &Properties<'_>, palette: &Palette<C>) -> Result<Self> {
-        let nearest = properties.choice("filter_type")? == "nearest";
+        let most = properties.integer("max_anisotropy")? as u32;
+        let (nearest, shape) = match properties.choice("filter_type")? {
+            "nearest" => (true, None),
+            "trilinear" => (false, Some(Shape::Round)),
+            "anisotropic" => (false, Some(Shape::Long(most))),
+            _ => (false, None),
+        };
+        if shape.is_some() && properties.is_strict() {
+            let message = "this filter is Étendue's own";
+            return Err(properties.error("filter_type", message).help(STRICT));
+        }
         let wrap = match properties.choice("wrap_mode")? {
             "mirror" => Wrap::Mirror,
             "clamp" => Wrap::Clamp,
@@ -111,7 +153,14 @@ impl<C: ColorModel> Bitmap<C> {
         let raw = properties.boolean("raw")?;
         let path = properties.file("filename")?;
         let to_uv = to_uv(properties)?;
-        let key = (path, palette.role, raw);
+        let mipmapped = shape.is_some();
+        let key = TexelKey {
+            path,
+            role: palette.role,
+            raw,
+            mipmapped,
+        };
+        palette.mipmaps.fetch_or(mipmapped, Ordering::Relaxed);
         let lock = || {
             palette
                 .texels
@@ -122,7 +171,7 @@ impl<C: ColorModel> Bitmap<C> {
         let texels = match cached {
             Some(texels) => texels,
             None => {
-                let loaded = load(&key.0, palette, raw, properties.budget())
+                let loaded = load(&key, palette, properties.budget())
                     .map_err(|e| e.at(properties.location()))?;
                 let Loaded { texels, clamped } = loaded;
                 if clamped > 0 {
@@ -139,6 +188,7 @@ impl<C: ColorModel> Bitmap<C> {
         Ok(Self {
             texels,
             nearest,
+            shape: shape.unwrap_or(Shape::Round),
             wrap,
             to_uv,
         })
@@ -162,7 +212,7 @@ impl<C: ColorModel> Bitmap<C> {
         let place = self.place(uv);
         let (px, py) = (place.x - F::splat(0.5), place.y - F::splat(0.5));
         let (x, y) = (px.floor(), py.floor());
-        let Texels { size, texels } = &*self.texels;
+        let Texels { size, texels, .. } = &*self.texels;
         let [width, height] = *size;
         let (left, right) = (
             self.wrap.apply(x, width),
@@ -188,16 +238,43 @@ impl<C: ColorModel> Bitmap<C> {
         }
     }
 
-    /// The values at points.
+    /// The image with its levels, if it has any.
+    #[inline(always)]
+    fn mipmap(&self) -> Option<Mipmap<'_, C>> {
+        let Texels {
+            size,
+            texels,
+            pyramid,
+        } = &*self.texels;
+        let (size, wrap) = (*size, self.wrap);
+        pyramid.as_ref().map(|pyramid| Mipmap {
+            size,
+            texels,
+            pyramid,
+            wrap,
+        })
+    }
+
+    /// The values at points that cover so much of texture coordinates, see [`Interaction::footprint`].
     #[inline(always)]
     pub(super) fn eval_lanes<F: Lanes>(
         &self,
         uv: lanes::Vec2<F>,
+        footprint: [lanes::Vec2<F>; 2],
         wavelengths: &[C::Wavelengths],
     ) -> C::Columns<F> {
+        if let Some(mipmap) = self.mipmap() {
+            return F::call(Look {
+                bitmap: self,
+                mipmap,
+                uv,
+                footprint,
+                wavelengths,
+            });
+        }
         if self.nearest {
             let place = self.place(uv);
-            let Texels { size, texels } = &*self.texels;
+            let Texels { size, texels, .. } = &*self.texels;
             let x = self.wrap.apply(place.x.floor(), size[0]);
             let y = self.wrap.apply(place.y.floor(), size[1]);
             let index = y * Ints::splat(size[0] as u32) + x;
@@ -214,19 +291,50 @@ impl<C: ColorModel> Bitmap<C> {
     }
 }
 
+/// The arguments of [`Bitmap::eval_lanes`], of an image with levels.
+struct Look<'a, C: ColorModel, F: Lanes> {
+    bitmap: &'a Bitmap<C>,
+    mipmap: Mipmap<'a, C>,
+    uv: lanes::Vec2<F>,
+    footprint: [lanes::Vec2<F>; 2],
+    wavelengths: &'a [C::Wavelengths],
+}
+
+impl<C: ColorModel, F: Lanes> Call<F> for Look<'_, C, F> {
+    type Output = C::Columns<F>;
+
+    #[inline(always)]
+    fn run(self) -> C::Columns<F> {
+        let Self {
+            bitmap,
+            mipmap,
+            uv,
+            footprint,
+            wavelengths,
+        } = self;
+        let uv = transformed(&bitmap.to_uv, uv);
+        let probes = Probes::new(footprint, &bitmap.to_uv, mipmap.size, bitmap.shape);
+        let share = F::one() / probes.count;
+        let mut sum = C::Columns::<F>::zero();
+        for number in 0..probes.most() {
+            let looks = F::splat(number as f32).lt(probes.count);
+            let place = uv + probes.place(number);
+            let value = mipmap.eval(place, probes.length, wavelengths);
+            sum = C::Columns::<F>::select(looks, sum + value * share, sum);
+        }
+        sum
+    }
+}
+
 struct Loaded<C: ColorModel> {
     texels: Texels<C>,
     /// How many texels are no reflectances.
     clamped: usize,
 }
 
-fn load<C: ColorModel>(
-    path: &std::path::Path,
-    palette: &Palette<C>,
-    raw: bool,
-    budget: &Budget,
-) -> Result<Loaded<C>> {
-    let picture = Picture::read(path, raw, budget)?;
+fn load<C: ColorModel>(key: &TexelKey, palette: &Palette<C>, budget: &Budget) -> Result<Loaded<C>> {
+    let raw = key.raw;
+    let picture = Picture::read(&key.path, raw, budget)?;
     let size = picture.size;
     let role = match palette.role {
         Role::Reflectance if raw => Role::Quantity,
@@ -243,10 +351,18 @@ fn load<C: ColorModel>(
         Role::Reflectance => picture.pixels.iter().filter(|rgb| !fits(*rgb)).count(),
         _ => 0,
     };
+    let (texels, pyramid) = match key.mipmapped && size != [1, 1] {
+        true => {
+            let (texels, pyramid) = picture.into_pyramid(&palette.color, role)?;
+            (texels, Some(pyramid))
+        }
+        false => (picture.into_texels(&palette.color, role)?, None),
+    };
     Ok(Loaded {
         texels: Texels {
             size,
-            texels: picture.into_texels(&palette.color, role)?,
+            texels,
+            pyramid,
         },
         clamped,
     })
@@ -255,12 +371,30 @@ fn load<C: ColorModel>(
 impl<C: ColorModel> Pattern<C> for Bitmap<C> {
     fn eval(&self, at: &Interaction<'_>, wavelengths: &C::Wavelengths) -> C::Sample {
         let w = std::slice::from_ref(wavelengths);
-        self.eval_lanes::<f32>(at.uv.into(), w).sample(0)
+        let footprint = at.footprint.map(lanes::Vec2::from);
+        self.eval_lanes::<f32>(at.uv.into(), footprint, w).sample(0)
     }
 
     fn gradient(&self, at: &Interaction<'_>, wavelengths: &C::Wavelengths) -> [C::Sample; 2] {
         if self.nearest {
             return [C::Sample::zero(); 2];
+        }
+        let m = &self.to_uv;
+        if let Some(mipmap) = self.mipmap() {
+            // As long as one probe.
+            let footprint = at.footprint.map(lanes::Vec2::from);
+            let length = Probes::<f32>::new(footprint, m, mipmap.size, Shape::Round).length;
+            let length = length.max(1.0);
+            let uv: Vec2 = transformed::<f32>(m, at.uv.into()).into();
+            let w = std::slice::from_ref(wavelengths);
+            let value =
+                |uv: Vec2| -> C::Sample { mipmap.eval::<f32>(uv.into(), length, w).sample(0) };
+            let [along_x, along_y] = [Vec2::X, Vec2::Y].map(|axis| {
+                let step = length / axis.dot(Vec2::from(mipmap.size.map(|n| n as f32)));
+                let half = axis * (0.5 * step);
+                (value(uv + half) - value(uv - half)) * step.recip()
+            });
+            return [m.x_axis, m.y_axis].map(|axis| along_x * axis.x + along_y * axis.y);
         }
         let cell = self.cell::<f32>(at.uv.into(), std::slice::from_ref(wavelengths));
         let f = Vec2::from(cell.f);
@@ -269,7 +403,6 @@ impl<C: ColorModel> Pattern<C> for Bitmap<C> {
         let [width, height] = self.texels.size.map(|n| n as f32);
         let along_x = ((b - a) * (1.0 - f.y) + (d - c) * f.y) * width;
         let along_y = ((c - a) * (1.0 - f.x) + (d - b) * f.x) * height;
-        let m = &self.to_uv;
         [m.x_axis, m.y_axis].map(|axis| along_x * axis.x + along_y * axis.y)
     }
 

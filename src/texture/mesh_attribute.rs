@@ -128,6 +128,7 @@ mod tests {
             uv: Vec2::ZERO,
             dp_du: Vec3::X,
             dp_dv: Vec3::Y,
+            footprint: [Vec2::ZERO; 2],
             wi: Vec3::Z,
             time: 0.0,
             shape: 0,

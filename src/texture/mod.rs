@@ -10,6 +10,8 @@ mod glass;
 mod irregular;
 mod mesh_attribute;
 mod picture;
+mod probes;
+mod pyramid;
 mod rawconstant;
 mod regular;
 mod sellmeier;
@@ -20,6 +22,7 @@ mod zoneplate;
 
 use std::collections::HashMap;
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 
 use glam::{Mat3, Vec3};
@@ -116,7 +119,7 @@ impl<C: ColorModel, F: Lanes> Call<F> for LookUp<'_, C, F> {
             wavelengths,
         } = self;
         match texture {
-            Texture::Bitmap(bitmap) => bitmap.eval_lanes(at.uv, wavelengths),
+            Texture::Bitmap(bitmap) => bitmap.eval_lanes(at.uv, at.footprint, wavelengths),
             Texture::Checkerboard(board) => board.eval_lanes(at, wavelengths),
             Texture::D65(light) => light.eval_lanes(at, wavelengths),
             Texture::Volume(volume) => volume.eval_lanes(at, wavelengths),
@@ -155,13 +158,24 @@ pub struct Palette<C: ColorModel> {
     /// What the colours stand for.
     pub role: Role,
     texels: TexelCache<C>,
+    /// Whether any image has levels.
+    mipmaps: Arc<AtomicBool>,
     warnings: Warnings,
 }
 
 /// What is worth knowing about the colours that were made.
 type Warnings = Arc<Mutex<Vec<Problem>>>;
 
-type TexelCache<C> = Arc<Mutex<HashMap<(PathBuf, Role, bool), Arc<Texels<C>>>>>;
+type TexelCache<C> = Arc<Mutex<HashMap<TexelKey, Arc<Texels<C>>>>>;
+
+/// What two textures must agree in to share their texels.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+struct TexelKey {
+    path: PathBuf,
+    role: Role,
+    raw: bool,
+    mipmapped: bool,
+}
 
 impl<C: ColorModel> Palette<C> {
     /// Nothing loaded yet.
@@ -170,6 +184,7 @@ impl<C: ColorModel> Palette<C> {
             color,
             role: Role::Reflectance,
             texels: TexelCache::default(),
+            mipmaps: Arc::default(),
             warnings: Warnings::default(),
         }
     }
@@ -181,6 +196,7 @@ impl<C: ColorModel> Palette<C> {
             color: self.color.clone(),
             role,
             texels: self.texels.clone(),
+            mipmaps: self.mipmaps.clone(),
             warnings: self.warnings.clone(),
         }
     }
@@ -368,19 +384,26 @@ impl<C: ColorModel> Palettes<C> {
     /// Nothing loaded yet.
     pub fn new(color: C) -> Self {
         let colors = Palette::new(color);
-        let warnings = colors.warnings.clone();
+        let (warnings, mipmaps) = (colors.warnings.clone(), colors.mipmaps.clone());
         Self {
             numbers: Palette {
                 warnings: warnings.clone(),
+                mipmaps: mipmaps.clone(),
                 ..Palette::new(Mono)
             },
             vectors: Palette {
                 warnings,
+                mipmaps,
                 role: Role::Quantity,
                 ..Palette::new(Rgb)
             },
             colors,
         }
+    }
+
+    /// Whether any image that was loaded has levels, so that textures ask for footprints.
+    pub fn have_mipmaps(&self) -> bool {
+        self.colors.mipmaps.load(Ordering::Relaxed)
     }
 
     /// What was noted so far by any of the palettes.
@@ -433,5 +456,7 @@ fn transformed<F: Lanes>(to_uv: &Mat3, uv: lanes::Vec2<F>) -> lanes::Vec2<F> {
     all(to_uv.x_axis) * uv.x + all(to_uv.y_axis) * uv.y + all(to_uv.z_axis)
 }
 
+#[cfg(test)]
+mod mipmap_tests;
 #[cfg(test)]
 mod tests;

@@ -3,6 +3,7 @@
 
 use std::path::Path;
 
+use super::pyramid::{Levels, Pyramid};
 use crate::budget::{Account, Budget};
 use crate::color::{ColorModel, Pixels, Role, srgb};
 use crate::error::{Error, Location, Result};
@@ -63,19 +64,68 @@ impl Picture {
         })
     }
 
+    /// Smaller images of what the colours stand for, see [`Levels`].
+    ///
+    /// # Errors
+    /// Where the budget does not allow them.
+    pub(super) fn levels(&self, role: Role) -> Result<Levels> {
+        let sizes = Levels::sizes(self.size);
+        let count: usize = sizes.iter().map(|[width, height]| width * height).sum();
+        self.account.take_rows(count, size_of::<[f32; 3]>())?;
+        let fraction = role == Role::Reflectance;
+        Ok(Levels::new(self.size, sizes, |index| {
+            let color = self.pixels.get(index);
+            match fraction {
+                true => color.map(|value| value.clamp(0.0, 1.0)),
+                false => color,
+            }
+        }))
+    }
+
     /// Its texels in the form in which they are evaluated; their memory is kept in place of the picture's.
     ///
     /// # Errors
     /// Where the budget does not allow it.
     pub fn into_texels<C: ColorModel>(self, color: &C, role: Role) -> Result<C::Texels> {
+        Ok(self.into_both(color, role, None)?.0)
+    }
+
+    /// The same with those of its levels.
+    ///
+    /// # Errors
+    /// Where the budget does not allow it.
+    pub(super) fn into_pyramid<C: ColorModel>(
+        self,
+        color: &C,
+        role: Role,
+    ) -> Result<(C::Texels, Pyramid<C>)> {
+        let levels = self.levels(role)?;
+        let (texels, above) = self.into_both(color, role, Some(levels.pixels))?;
+        let above = above.expect("there are as many as were given");
+        Ok((texels, Pyramid::new(levels.sizes, above)))
+    }
+
+    /// Its texels, and those above them.
+    fn into_both<C: ColorModel>(
+        self,
+        color: &C,
+        role: Role,
+        above: Option<Pixels>,
+    ) -> Result<(C::Texels, Option<C::Texels>)> {
         let Self {
             pixels, account, ..
         } = self;
-        let (count, bytes) = (pixels.count(), C::texel_bytes(&pixels));
-        account.take_rows(count, bytes)?;
-        let texels = color.texels(pixels, role);
-        account.keep((count * bytes) as u64);
-        Ok(texels)
+        let mut kept = 0;
+        let mut stored = |pixels: Pixels| {
+            let (count, bytes) = (pixels.count(), C::texel_bytes(&pixels));
+            account.take_rows(count, bytes)?;
+            kept += (count * bytes) as u64;
+            Ok::<_, Error>(color.texels(pixels, role))
+        };
+        let texels = stored(pixels)?;
+        let above = above.map(stored).transpose()?;
+        account.keep(kept);
+        Ok((texels, above))
     }
 }
 

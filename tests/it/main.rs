@@ -13,6 +13,7 @@ mod color;
 mod commands;
 mod compare;
 mod crosscheck;
+mod filters;
 mod golden;
 mod inputs;
 mod instances;

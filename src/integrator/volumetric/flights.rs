@@ -162,6 +162,7 @@ impl<C: ColorModel> Round<'_, C> {
             uv: Vec2::splat(0.0),
             dp_du: frame.s,
             dp_dv: frame.t,
+            footprint: [Vec2::splat(0.0); 2],
             wi: Vec3::all(glam::Vec3::Z),
             source: &inside,
         };
@@ -242,6 +243,7 @@ impl<C: ColorModel> Round<'_, C> {
                 },
                 ..*before
             };
+            (self.out.cones).scatter(path.slot, distances[lane], Some(pdfs[lane]));
             self.out.next.push(ray, path);
         }
     }

@@ -15,7 +15,7 @@ use super::bounce::{Bounces, Decisions};
 use super::limits::{self, Limits};
 use super::runs::Runs;
 use super::wave::{Outcome, Walker, Wave};
-use super::{Context, Cost, Estimates, Start};
+use super::{Context, Cost, Estimates, Footprint, Start};
 use crate::color::{ColorModel, Spectra, Spectral};
 use crate::description::{NodeId, Properties};
 use crate::error::Result;
@@ -29,12 +29,13 @@ use segments::{Segment, Segments};
 use surfaces::Surfaces;
 
 /// The settings.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Volumetric {
     pub(super) limits: Limits,
     pub(super) hide_emitters: bool,
     /// The node of the medium that the camera stands in.
     pub(super) medium: Option<NodeId>,
+    pub(super) footprint: Option<Footprint>,
 }
 
 /// A round decides on a light, on the way on and on how far a path gets.
@@ -162,6 +163,7 @@ impl Volumetric {
             limits: Limits::build(properties)?,
             hide_emitters: properties.boolean("hide_emitters")?,
             medium: context.medium,
+            footprint: context.footprint.clone(),
         })
     }
 
@@ -193,7 +195,8 @@ impl Volumetric {
             depth: 0,
             density: unit,
             asked: unit,
-        });
+        })
+        .with_cones(self.footprint.as_ref());
         let mut segments = Segments::new(scene);
         let (mut media, mut gets_there) = (Runs::new(scene.medium_count()), Vec::new());
         for round in 0.. {
@@ -218,6 +221,7 @@ impl Volumetric {
                         out: Outcome {
                             shadows: &mut *out.shadows,
                             next: out.next,
+                            cones: out.cones,
                         },
                         gets_there,
                         estimates,

@@ -54,6 +54,7 @@ impl TrianglePoints<f32> {
             uv: self.uv.into(),
             dp_du: self.dp_du.into(),
             dp_dv: self.dp_dv.into(),
+            footprint: [glam::Vec2::ZERO; 2],
             wi: frame.to_local(-ray.direction),
             time: ray.time,
             shape: hit.shape,
