@@ -83,6 +83,17 @@ impl Bounds {
         }
     }
 
+    /// Its corners.
+    pub fn corners(&self) -> [Vec3; 8] {
+        std::array::from_fn(|i| {
+            let pick = |axis: usize| match i >> axis & 1 {
+                0 => self.min[axis],
+                _ => self.max[axis],
+            };
+            Vec3::new(pick(0), pick(1), pick(2))
+        })
+    }
+
     /// Whether it contains nothing.
     pub fn is_empty(&self) -> bool {
         !self.min.cmple(self.max).all()

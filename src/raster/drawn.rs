@@ -7,6 +7,7 @@ use std::borrow::Cow;
 use std::collections::HashMap;
 
 use glam::{DMat3, DVec3, Vec2, Vec3};
+use rayon::prelude::*;
 
 use super::projection::Projection;
 use crate::accel::{Standing, Tracer};
@@ -23,6 +24,8 @@ pub(super) struct Facets<'s> {
     pub(super) positions: Cow<'s, [Vec3]>,
     pub(super) triangles: Cow<'s, [[u32; 3]]>,
     pub(super) kind: FacetsOf<'s>,
+    /// Around all positions that are numbers.
+    pub(super) bounds: Bounds,
 }
 
 /// Of what they are.
@@ -46,6 +49,8 @@ pub(super) enum FacetsOf<'s> {
 pub(super) struct Placed {
     pub(super) shape: u32,
     pub(super) instance: u32,
+    /// Which triangles are its.
+    facets: usize,
     /// From its space to the world; `None` where that is the same.
     pub(super) to_world: Option<Transform>,
     /// The number of its first triangle.
@@ -71,7 +76,7 @@ type Fallible<T> = std::result::Result<T, Untessellated>;
 /// The triangles of a scene at one time.
 #[derive(Debug)]
 pub struct Drawn<'s> {
-    facets: HashMap<u32, Facets<'s>>,
+    facets: Vec<Facets<'s>>,
     placed: Vec<Placed>,
     warnings: Vec<Problem>,
 }
@@ -90,7 +95,8 @@ impl<'s> Drawn<'s> {
         time: f32,
         wanted: impl Fn(u32) -> bool,
     ) -> Result<Self> {
-        let mut facets: HashMap<u32, Facets<'s>> = HashMap::new();
+        let mut facets: Vec<Facets<'s>> = Vec::new();
+        let mut known: HashMap<u32, usize> = HashMap::new();
         let mut missing: Vec<(u32, Untessellated)> = Vec::new();
         // Where the same shape stands several times it is cut as finely as the nearest needs.
         let mut longest: HashMap<u32, f32> = HashMap::new();
@@ -114,25 +120,29 @@ impl<'s> Drawn<'s> {
             if missing.iter().any(|(other, _)| *other == shape) {
                 continue;
             }
-            if let std::collections::hash_map::Entry::Vacant(vacant) = facets.entry(shape) {
-                let edge = longest.get(&shape).copied();
-                match Facets::of(tracer.shape(shape), edge, projection, time) {
-                    Ok(of_shape) => {
-                        vacant.insert(of_shape);
+            let number = match known.get(&shape) {
+                Some(number) => *number,
+                None => {
+                    let edge = longest.get(&shape).copied();
+                    match Facets::of(tracer.shape(shape), edge, projection, time) {
+                        Ok(of_shape) => facets.push(of_shape),
+                        Err(why) => {
+                            missing.push((shape, why));
+                            continue;
+                        }
                     }
-                    Err(why) => {
-                        missing.push((shape, why));
-                        continue;
-                    }
+                    known.insert(shape, facets.len() - 1);
+                    facets.len() - 1
                 }
-            }
+            };
             placed.push(Placed {
                 shape,
                 instance: standing.instance,
+                facets: number,
                 to_world: standing.to_world.map(|moving| moving.at(time)),
                 first: next as u32,
             });
-            next += facets[&shape].triangles.len() as u64;
+            next += facets[number].triangles.len() as u64;
             if next >= u64::from(u32::MAX) {
                 let message =
                     "there are more than 2³² triangles to be drawn, each instance's counted";
@@ -157,7 +167,7 @@ impl<'s> Drawn<'s> {
     }
 
     pub(super) fn facets(&self, placed: &Placed) -> &Facets<'s> {
-        &self.facets[&placed.shape]
+        &self.facets[placed.facets]
     }
 
     /// Where a triangle with that number stands, and which of the shape's it is.
@@ -193,6 +203,18 @@ fn bounds(geometry: &Geometry) -> Bounds {
     })
 }
 
+/// A box around those of the positions that are numbers.
+fn around(positions: &[Vec3]) -> Bounds {
+    // What is no number is not the lesser, and so is passed over on this side.
+    let with = |bounds: Bounds, position: &Vec3| Bounds {
+        min: position.min(bounds.min),
+        max: position.max(bounds.max),
+    };
+    let parts = positions.par_chunks(1 << 14);
+    let parts = parts.map(|part| part.iter().fold(Bounds::EMPTY, with));
+    parts.reduce(|| Bounds::EMPTY, Bounds::union)
+}
+
 /// How long edges of its triangles may be, in its own space.
 fn edge(geometry: &Geometry, to_world: Option<&Transform>, projection: &Projection) -> f32 {
     let own = bounds(geometry);
@@ -205,19 +227,10 @@ fn edge(geometry: &Geometry, to_world: Option<&Transform>, projection: &Projecti
         None => own,
     };
     let in_world = (inner.max - inner.min).length();
-    let corner = |i: u32| {
-        let pick = |axis: u32| {
-            if i >> axis & 1 == 1 {
-                inner.max
-            } else {
-                inner.min
-            }
-        };
-        DVec3::new(pick(0).x.into(), pick(1).y.into(), pick(2).z.into())
-    };
     let [near, _] = projection.range();
-    let nearest = (0..8).map(|i| projection.place(corner(i)).a);
-    let nearest = nearest.fold(f64::INFINITY, f64::min).max(near);
+    let corners = inner.corners().map(|corner| corner.as_dvec3());
+    let nearest = corners.map(|corner| projection.place(corner).a);
+    let nearest = nearest.into_iter().fold(f64::INFINITY, f64::min).max(near);
     // A chord of length h leaves a circle of radius r by h²/8r. A long thing is bent around its second side.
     let sides = (own.max - own.min).to_array();
     let [small, large] = [f32::min, f32::max].map(|pick| pick(pick(sides[0], sides[1]), sides[2]));
@@ -299,6 +312,7 @@ impl<'s> Facets<'s> {
         };
         Ok(Self {
             geometry,
+            bounds: around(&positions),
             positions,
             triangles,
             kind,

@@ -9,7 +9,7 @@
 use glam::{DMat3, DVec2, DVec3, Vec2, Vec3};
 
 use crate::error::{Error, Result};
-use crate::sensor::{Film, Sensor};
+use crate::sensor::{Film, Sensor, Window};
 
 /// From the world to a picture in pixels, from its upper left corner on.
 #[derive(Clone, Debug)]
@@ -209,6 +209,23 @@ impl Projection {
     pub fn steps(&self, a: f64) -> [DVec3; 2] {
         let scale = if self.is_perspective { a } else { 1.0 };
         [self.ways.x_axis * scale, self.ways.y_axis * scale]
+    }
+
+    /// Whether nothing of what these places are the corners of is seen in a window: all of it is before the range or beyond it,
+    /// or to one side of the window.
+    pub(super) fn misses(&self, corners: &[Place], window: &Window) -> bool {
+        let [left, top] = [window.x, window.y].map(f64::from);
+        let (right, bottom) = (
+            left + f64::from(window.width),
+            top + f64::from(window.height),
+        );
+        let all = |out: &dyn Fn(&Place) -> bool| corners.iter().all(out);
+        all(&|p| p.a < self.near)
+            || all(&|p| p.a > self.far)
+            || all(&|p| p.x < left * p.w)
+            || all(&|p| p.x > right * p.w)
+            || all(&|p| p.y < top * p.w)
+            || all(&|p| p.y > bottom * p.w)
     }
 
     /// How large a pixel is at a place that far along its ray, in world units.

@@ -2,7 +2,7 @@
 //! top-left rule (Pineda, *A parallel algorithm for polygon rendering*, 1988). So a sample on an edge that two triangles share
 //! belongs to one of them, and a closed surface has neither cracks nor samples that are drawn twice.
 //!
-//! What an edge leaves of a row of samples is computed by one division, so that the samples within need no test.
+//! What an edge leaves of a long row of samples is computed by one division.
 
 use super::projection::Place;
 use crate::sensor::Window;
@@ -28,7 +28,7 @@ pub(super) struct Grid {
 /// A corner.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Corner {
-    /// On the grid; `UNPLACED` where the triangle has to be cut first.
+    /// On the grid; `UNPLACED` where the triangle has to be cut first, and then which limits it is beyond.
     pub(super) x: i32,
     pub(super) y: i32,
     /// What is linear over the picture.
@@ -38,16 +38,22 @@ pub(super) struct Corner {
 impl Corner {
     const UNPLACED: i32 = i32::MIN;
 
-    /// One that does not lie within the limits.
-    pub(super) const OUTSIDE: Self = Self {
-        x: Self::UNPLACED,
-        y: 0,
-        linear: 0.0,
-    };
+    /// One that is beyond some limits, a bit each.
+    pub(super) fn outside(beyond: i32) -> Self {
+        Self {
+            x: Self::UNPLACED,
+            y: beyond,
+            linear: 0.0,
+        }
+    }
 
+    /// A bit for each limit that it is beyond.
     #[inline]
-    pub(super) fn is_outside(&self) -> bool {
-        self.x == Self::UNPLACED
+    pub(super) fn beyond(&self) -> i32 {
+        match self.x {
+            Self::UNPLACED => self.y,
+            _ => 0,
+        }
     }
 }
 
@@ -178,55 +184,94 @@ impl Facet {
         mut take: impl FnMut(usize, usize, f64),
     ) {
         let [a, b, c] = &self.corners;
-        let edges = [(b, c), (c, a), (a, b)];
         let top = self.rows.0.max(i64::from(rows.start));
         let bottom = self.rows.1.min(i64::from(rows.end) - 1);
+        let begin = [self.columns.0 << grid.bits, top << grid.bits];
+        let edges = [(b, c), (c, a), (a, b)].map(|(from, to)| Edge::new(from, to, begin));
         let scale = 1.0 / self.area as f64;
         let step = 1_i64 << grid.bits;
-        let is_column = self.columns.0 == self.columns.1;
-        for (sample, [inset_x, inset_y]) in grid.samples.iter().enumerate() {
-            let x = (self.columns.0 << grid.bits) + inset_x;
-            for row in top..=bottom {
-                let y = (row << grid.bits) + inset_y;
-                let mut values = [0; 3];
-                let (mut first, mut last) = (0, self.columns.1 - self.columns.0);
-                let mut across = [0; 3];
-                for (i, (from, to)) in edges.iter().enumerate() {
-                    let dy = i64::from(to.y) - i64::from(from.y);
-                    let value = edge(from, to, x, y);
-                    let along = -dy * step;
-                    (values[i], across[i]) = (value, along);
-                    // A sample on the edge counts where that is a left one or one at the top.
-                    let counts = dy < 0 || (dy == 0 && to.x > from.x);
-                    let inner = value - i64::from(!counts);
-                    // Most triangles of a large mesh are in one column, where nothing is to be divided.
-                    if inner < 0 {
-                        if along <= 0 || is_column {
-                            last = -1;
-                        } else {
-                            first = first.max((-inner + along - 1) / along);
-                        }
-                    } else if along < 0 && !is_column {
-                        last = last.min(inner / -along);
+        let last = self.columns.1 - self.columns.0;
+        let along = |values: [i64; 3]| {
+            let [u, v, w] = values.map(|value| value as f64 * scale);
+            u * a.linear + v * b.linear + w * c.linear
+        };
+        for (sample, inset) in grid.samples.iter().enumerate() {
+            let mut values = edges.each_ref().map(|edge| edge.moved(*inset));
+            let mut first_pixel = (top * i64::from(grid.size[0]) + self.columns.0) as usize;
+            for _ in top..=bottom {
+                let columns = match last < NARROW {
+                    true => 0..last + 1,
+                    false => span(&edges, &values, step, last),
+                };
+                let mut here = [0, 1, 2].map(|i| values[i] - edges[i].dy * step * columns.start);
+                for column in columns {
+                    // All within if none is negative. A span has been found to be so.
+                    let within = [0, 1, 2].map(|i| here[i] - edges[i].least);
+                    if within[0] | within[1] | within[2] >= 0 {
+                        take(first_pixel + column as usize, sample, along(here));
+                    }
+                    for (value, edge) in here.iter_mut().zip(&edges) {
+                        *value -= edge.dy * step;
                     }
                 }
-                if first > last {
-                    continue;
+                for (value, edge) in values.iter_mut().zip(&edges) {
+                    *value += edge.dx * step;
                 }
-                let begin = (row * i64::from(grid.size[0]) + self.columns.0) as usize;
-                // Linear: at the first of the samples, and how it changes.
-                let at = |values: [i64; 3]| {
-                    let [u, v, w] = values.map(|value| value as f64 * scale);
-                    u * a.linear + v * b.linear + w * c.linear
-                };
-                let value = |i: usize, column: i64| values[i] + across[i] * column;
-                for column in first..=last {
-                    let linear = at([value(0, column), value(1, column), value(2, column)]);
-                    take(begin + column as usize, sample, linear);
-                }
+                first_pixel += grid.size[0] as usize;
             }
         }
     }
+}
+
+/// Pixels across up to which each is asked whether it is within: most triangles of a large mesh have one.
+const NARROW: i64 = 4;
+
+/// An edge of a triangle as a function of the place, which is not negative within.
+struct Edge {
+    dx: i64,
+    dy: i64,
+    /// Where it is asked first.
+    value: i64,
+    /// What it has to be at least: a sample on the edge counts where that is a left one or one at the top.
+    least: i64,
+}
+
+impl Edge {
+    #[inline]
+    fn new(from: &Corner, to: &Corner, [x, y]: [i64; 2]) -> Self {
+        let dx = i64::from(to.x) - i64::from(from.x);
+        let dy = i64::from(to.y) - i64::from(from.y);
+        let counts = dy < 0 || (dy == 0 && dx > 0);
+        Self {
+            dx,
+            dy,
+            value: edge(from, to, x, y),
+            least: i64::from(!counts),
+        }
+    }
+
+    /// Its value that far from where it is asked first.
+    #[inline]
+    fn moved(&self, [x, y]: [i64; 2]) -> i64 {
+        self.value + self.dx * y - self.dy * x
+    }
+}
+
+/// The pixels of a row, up to the last one, that are within all edges, whose values at the first of them are these.
+fn span(edges: &[Edge; 3], values: &[i64; 3], step: i64, mut last: i64) -> std::ops::Range<i64> {
+    let mut first = 0;
+    for (edge, value) in edges.iter().zip(values) {
+        let (inner, along) = (value - edge.least, -edge.dy * step);
+        if inner < 0 {
+            if along <= 0 {
+                return 0..0;
+            }
+            first = first.max((-inner + along - 1) / along);
+        } else if along < 0 {
+            last = last.min(inner / -along);
+        }
+    }
+    first..last + 1
 }
 
 #[cfg(test)]

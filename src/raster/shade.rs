@@ -133,22 +133,16 @@ impl<'s, C: ColorModel> Shader<'s, C> {
             let light = &self.scene.lights()[id.index()];
             // From the scene's middle nothing may be seen of a light that shines beside it.
             let middle = 0.5 * bounds.min + 0.5 * bounds.max;
-            let corners = (0..8).map(|i| {
-                let pick = |axis: usize| match i >> axis & 1 {
-                    0 => bounds.min[axis],
-                    _ => bounds.max[axis],
-                };
-                Vec3::new(pick(0), pick(1), pick(2))
-            });
-            let mut samples = std::iter::once(middle)
-                .chain(corners)
-                .filter_map(|position| {
-                    let from = Reference {
-                        position,
-                        time: self.time,
-                    };
-                    light.sample(from, MIDDLE, &self.wavelengths)
-                });
+            let mut samples =
+                std::iter::once(middle)
+                    .chain(bounds.corners())
+                    .filter_map(|position| {
+                        let from = Reference {
+                            position,
+                            time: self.time,
+                        };
+                        light.sample(from, MIDDLE, &self.wavelengths)
+                    });
             let Some(sample) = samples.next() else {
                 continue;
             };

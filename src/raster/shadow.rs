@@ -10,7 +10,7 @@ use glam::{DMat3, DVec2, DVec3, Vec3};
 
 use super::depth::{DepthCode, DepthFormat};
 use super::drawn::Drawn;
-use super::projection::{Place, Projection};
+use super::projection::Projection;
 use super::visibility::{Canvas, Visibility};
 use crate::error::Result;
 use crate::shape::Bounds;
@@ -91,7 +91,10 @@ impl ShadowMap {
             let Some(projection) = projection.in_pixels(pixels) else {
                 continue;
             };
-            if is_beside(&projection, bounds, size) {
+            let corners = bounds
+                .corners()
+                .map(|corner| projection.place(corner.as_dvec3()));
+            if projection.misses(&corners, &canvas.window) {
                 continue;
             }
             faces.push(Face {
@@ -139,30 +142,6 @@ impl ShadowMap {
         }
         lit as f32 / (filter * filter) as f32
     }
-}
-
-/// Whether all of a box is beside, behind or beyond a picture.
-fn is_beside(projection: &Projection, bounds: &Bounds, size: u32) -> bool {
-    let [near, far] = projection.range();
-    let size = f64::from(size);
-    let corners = (0..8).map(|i| {
-        let pick = |axis: usize| match i >> axis & 1 {
-            0 => f64::from(bounds.min[axis]),
-            _ => f64::from(bounds.max[axis]),
-        };
-        projection.place(DVec3::new(pick(0), pick(1), pick(2)))
-    });
-    let outside: [fn(&Place, [f64; 3]) -> bool; 6] = [
-        |p, [near, ..]| p.a < near,
-        |p, [_, far, _]| p.a > far,
-        |p, _| p.x < 0.0,
-        |p, _| p.y < 0.0,
-        |p, [.., size]| p.x > size * p.w,
-        |p, [.., size]| p.y > size * p.w,
-    ];
-    outside
-        .iter()
-        .any(|out| corners.clone().all(|place| out(&place, [near, far, size])))
 }
 
 #[cfg(test)]

@@ -5,9 +5,10 @@ use super::*;
 use crate::accel::{Method, Tracer};
 use crate::color::Rgb;
 use crate::description::{Description, Kind, Options};
+use crate::math::Bounds;
 use crate::mesh::Mesh;
 use crate::scene::{Assets, Scene, build};
-use crate::sensor::{Film, Sensor};
+use crate::sensor::{Film, Sensor, Window};
 use crate::shape::{Geometry, TriangleMesh};
 use glam::{DVec2, DVec3, Vec2, Vec3};
 
@@ -246,4 +247,45 @@ fn a_depth_of_few_bits_cannot_tell_near_surfaces_apart() {
     let right = behind(DepthFormat::Float);
     assert_eq!(behind(DepthFormat::Bits(31)), right);
     assert!(behind(DepthFormat::Bits(14)) > right + 100);
+}
+
+#[test]
+fn of_a_box_that_is_missed_no_point_is_seen() {
+    let window = Window {
+        x: 20,
+        y: 10,
+        width: 30,
+        height: 25,
+    };
+    for plugin in ["perspective", "orthographic"] {
+        let (_, sensor, film) = scene(&sensor(plugin, ""));
+        let projection = Projection::of_sensor(&sensor, &film, 0.0).unwrap();
+        let [near, far] = projection.range();
+        let is_seen = |point: Vec3| {
+            let place = projection.place(point.as_dvec3());
+            let (x, y) = (place.x / place.w, place.y / place.w);
+            (near..=far).contains(&place.a)
+                && (20.0..=50.0).contains(&x)
+                && (10.0..=35.0).contains(&y)
+        };
+        let [mut missed, mut seen] = [0; 2];
+        for i in 0..9 * 9 * 9 {
+            let step = |i: i32| 1.5 * (i % 9 - 4) as f32;
+            let centre = Vec3::new(step(i), step(i / 9), step(i / 81));
+            let bounds = Bounds {
+                min: centre - 0.4,
+                max: centre + 0.4,
+            };
+            let corners = bounds.corners();
+            let places = corners.map(|corner| projection.place(corner.as_dvec3()));
+            let mut points = corners.into_iter().chain([centre]);
+            let any = points.any(is_seen);
+            if projection.misses(&places, &window) {
+                missed += 1;
+                assert!(!any, "{plugin} {centre}");
+            }
+            seen += i32::from(any);
+        }
+        assert!(missed > 500 && seen > 10, "{plugin}: {missed} {seen}");
+    }
 }

@@ -112,6 +112,9 @@ impl Visibility {
         };
         let mut high = Vec::new();
         for placed in drawn.placed() {
+            if painter.misses(drawn, placed, &window) {
+                continue;
+            }
             high.append(&mut painter.paint(drawn, placed, cull));
         }
         let bands = (0..size[1].div_ceil(ROWS)).into_par_iter();
@@ -160,6 +163,15 @@ struct Painter<'a> {
 }
 
 impl Painter<'_> {
+    /// Whether nothing of a shape is seen in the window.
+    fn misses(&self, drawn: &Drawn<'_>, placed: &Placed, window: &Window) -> bool {
+        let (linear, translation) = placed.matrix();
+        let (matrix, offset) = self.projection.along_ways(linear, translation);
+        let corners = drawn.facets(placed).bounds.corners();
+        let corners = corners.map(|corner| self.place(&matrix, offset, corner));
+        self.projection.misses(&corners, window)
+    }
+
     /// Draws a shape; the answer is the triangles that are left, which are high.
     fn paint(&self, drawn: &Drawn<'_>, placed: &Placed, cull: Cull) -> Vec<(Facet, u32)> {
         let facets = drawn.facets(placed);
@@ -181,7 +193,11 @@ impl Painter<'_> {
             let first = placed.first + (run * GRAIN) as u32;
             for (number, triangle) in (first..).zip(triangles) {
                 let three = triangle.map(|i| corners[i as usize]);
-                if three.iter().any(Corner::is_outside) {
+                let [a, b, c] = three.each_ref().map(Corner::beyond);
+                if a & b & c != 0 {
+                    continue;
+                }
+                if a | b | c != 0 {
                     let places =
                         triangle.map(|i| self.place(&matrix, offset, facets.positions[i as usize]));
                     self.cut(places, |facet| {
@@ -211,7 +227,7 @@ impl Painter<'_> {
         let place = self.place(matrix, offset, position);
         match self.limits.contains(&place) {
             true => self.grid.corner(&place, self.code.linear(place.a)),
-            false => Corner::OUTSIDE,
+            false => Corner::outside(self.limits.beyond(&place)),
         }
     }
 
