@@ -111,6 +111,8 @@ pub struct Recipe {
     pub cache: Option<PathBuf>,
     /// The first and the last time of rays: what moves is bounded for these.
     pub shutter: (f32, f32),
+    /// The instructions with which it is walked.
+    pub kernel: Kernel,
 }
 
 impl Default for Recipe {
@@ -121,6 +123,7 @@ impl Default for Recipe {
             build: Build::default(),
             cache: None,
             shutter: (f32::NEG_INFINITY, f32::INFINITY),
+            kernel: Kernel::default(),
         }
     }
 }
@@ -251,7 +254,7 @@ impl Tracer {
             is_large: groups.iter().map(Group::bytes).sum::<usize>() > CACHED,
             groups,
             method: recipe.method,
-            kernel: Kernel::best(),
+            kernel: recipe.kernel,
             cache,
         }
     }
@@ -259,12 +262,6 @@ impl Tracer {
     /// A box around everything that has an end.
     pub fn bounds(&self) -> Bounds {
         self.groups[0].bounds()
-    }
-
-    /// The same with other instructions; the hits are the same to the bit.
-    #[must_use]
-    pub fn with_kernel(self, kernel: Kernel) -> Self {
-        Self { kernel, ..self }
     }
 
     /// The instructions that it uses, and whoever works with its hits.
@@ -366,8 +363,7 @@ impl Tracer {
     #[must_use]
     pub fn rebuilt(&self, recipe: impl Into<Recipe>) -> Self {
         let shapes = self.shapes.shared();
-        let tracer = Self::new(shapes, &self.group_of, self.instances.clone(), recipe);
-        tracer.with_kernel(self.kernel)
+        Self::new(shapes, &self.group_of, self.instances.clone(), recipe)
     }
 
     /// What the folder of trees was good for, if there was one.

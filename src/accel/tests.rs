@@ -44,17 +44,18 @@ fn rays(count: u32, targets: &[Vec3]) -> Vec<Ray> {
 
 /// Brute force, and the tree walked by every kernel.
 pub(super) fn all(shapes: &[Arc<Geometry>], groups: &[u32], instances: &[Instance]) -> Vec<Tracer> {
-    let tracer = |method, build| {
+    let tracer = |method, kernel| {
         let recipe = Recipe {
             method,
-            build,
+            build: Build::Medium,
+            kernel,
             ..Recipe::default()
         };
         Tracer::new(shapes.to_vec(), groups, instances.to_vec(), recipe)
     };
     let walked = Kernel::all().into_iter();
-    let trees = walked.map(|kernel| tracer(Method::Tree, Build::Medium).with_kernel(kernel));
-    [tracer(Method::Brute, Build::Medium)]
+    let trees = walked.map(|kernel| tracer(Method::Tree, kernel));
+    [tracer(Method::Brute, Kernel::default())]
         .into_iter()
         .chain(trees)
         .collect()

@@ -12,6 +12,7 @@ use etendue::description::{self, Description, Kind, Value};
 use etendue::display;
 use etendue::error::{Error, Problem, Result};
 use etendue::image;
+use etendue::lanes::Kernel;
 use etendue::render::{
     Adaptive, Checkpoint, Options, Outline, Overrides, Passes, Picture, Progress, Rendered,
     Session, is_current, is_mesh, is_part, outline, sensors,
@@ -237,6 +238,7 @@ impl Arguments {
                 Accel::Brute => Method::Brute,
                 Accel::Tree => Method::Tree,
             },
+            kernel: Kernel::default(),
             build: self.build.map(|work| match work {
                 Work::Quick => Build::Quick,
                 Work::Fast => Build::Fast,

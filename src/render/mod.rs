@@ -216,6 +216,3 @@ pub fn human_duration(duration: Duration) -> String {
         s => format!("{} h {} min", s / 3600, s % 3600 / 60),
     }
 }
-
-#[cfg(test)]
-mod tests;

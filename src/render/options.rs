@@ -8,6 +8,7 @@ use super::plugins::plugins;
 use crate::accel::{Build, Method};
 use crate::denoise::{ALBEDO, NORMAL};
 use crate::description::{Description, Kind, NodeId, Value};
+use crate::lanes::Kernel;
 use crate::sensor::Window;
 
 /// Which colour model a render uses.
@@ -77,6 +78,8 @@ pub struct Options {
     pub method: Method,
     /// How much work goes into the tree; what suits the scene and the rays where absent.
     pub build: Option<Build>,
+    /// The instructions that are used; the image is the same to the bit.
+    pub kernel: Kernel,
     /// A folder in which trees are kept from one run to the next.
     pub cache: Option<PathBuf>,
     /// Which of the scene's sensors, in file order from 0.

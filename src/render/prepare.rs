@@ -26,6 +26,7 @@ use crate::error::{self, Error, Location, Problem, Problems, Result};
 use crate::film::Layout;
 use crate::image::{self, Image, Window};
 use crate::integrator::{self, Estimator, Footprint, Integrator, Lens};
+use crate::lanes::Kernel;
 use crate::mesh::ReadMesh;
 use crate::sampler::Sampler;
 use crate::scene::{self, Assets, Scene};
@@ -69,6 +70,7 @@ struct Key {
     model: Model,
     method: Method,
     build: Option<Build>,
+    kernel: Kernel,
     /// The shutter's times, where anything moves.
     shutter: Option<[u32; 2]>,
 }
@@ -414,6 +416,7 @@ fn make<C: ColorModel>(
             build,
             cache: options.cache.clone(),
             shutter,
+            kernel: options.kernel,
         };
         let Some(view) = view.filter(|_| ask.previews()) else {
             return scene::build(description, &assets, color, recipe);
@@ -478,6 +481,7 @@ pub(super) fn prepare<'k, C: ColorModel>(ask: &'k mut Ask<'_>, color: C) -> Resu
         model: Model::of(description, options)?,
         method: ask.method(),
         build: options.build,
+        kernel: options.kernel,
         shutter: description
             .has_motion()
             .then(|| [share.shutter.0, share.shutter.1].map(f32::to_bits)),

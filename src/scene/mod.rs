@@ -17,7 +17,7 @@ use crate::color::{ColorModel, Spectral};
 use crate::description::NodeId;
 use crate::error::Problem;
 use crate::interaction::{Hit, Interaction, Points, Ray};
-use crate::lanes::{self, Ints, Kernel, Lanes, Mask as _};
+use crate::lanes::{self, Ints, Lanes, Mask as _};
 use crate::light::{Light, LightSamples};
 use crate::material::Material;
 use crate::medium::Medium;
@@ -134,15 +134,6 @@ impl<C: ColorModel> Scene<C> {
     /// The shapes.
     pub fn tracer(&self) -> &Tracer {
         &self.tracer
-    }
-
-    /// The same with other instructions; what is seen is the same to the bit.
-    #[must_use]
-    pub fn with_kernel(self, kernel: Kernel) -> Self {
-        Self {
-            tracer: self.tracer.with_kernel(kernel),
-            ..self
-        }
     }
 
     /// The same, whose shapes are met in another way; what is seen is the same to the bit.

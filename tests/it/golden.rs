@@ -14,7 +14,8 @@ use etendue::budget::Budget;
 use etendue::description::{Description, Options as ReadOptions};
 use etendue::display;
 use etendue::image::{self, Image, Metadata};
-use etendue::render::{Options, Overrides, Silent, render};
+use etendue::lanes::Kernel;
+use etendue::render::{Colors, Options, Overrides, Silent, render};
 
 use super::support::at;
 
@@ -28,10 +29,14 @@ fn scenes() -> Vec<PathBuf> {
     scenes
 }
 
+fn described(scene: &Path) -> Description {
+    Description::read(scene, &ReadOptions::default(), &Budget::default())
+        .unwrap_or_else(|e| panic!("{e}"))
+}
+
 /// Renders a scene small, as a PNG at `path`.
 fn render_small(scene: &Path, path: &Path) {
-    let mut description = Description::read(scene, &ReadOptions::default(), &Budget::default())
-        .unwrap_or_else(|e| panic!("{e}"));
+    let mut description = described(scene);
     Overrides {
         spp: Some(16),
         size: Some((72, 54)),
@@ -157,5 +162,37 @@ fn every_golden_image_has_its_scene() {
             names.iter().any(|n| *n == name),
             "tests/golden/{name} has no scene"
         );
+    }
+}
+
+#[test]
+fn every_kernel_renders_every_scene_to_the_same_bits() {
+    let in_bands = [5, 40].map(Colors::bands);
+    let in_bands = in_bands.into_iter().filter(|_| cfg!(feature = "bands"));
+    let models: Vec<Colors> = std::iter::once(Colors::Rgb).chain(in_bands).collect();
+    for scene in scenes() {
+        let mut description = described(&scene);
+        Overrides {
+            spp: Some(3),
+            size: Some((32, 24)),
+            ..Overrides::default()
+        }
+        .apply(&mut description);
+        for colors in &models {
+            let mut expected = None;
+            for kernel in Kernel::all() {
+                let options = Options {
+                    colors: *colors,
+                    kernel,
+                    ..Options::default()
+                };
+                let rendered = render(&description, &options, &Silent);
+                let image = rendered.unwrap_or_else(|e| panic!("{e}")).image;
+                let bits: Vec<u32> = image.data().iter().map(|v| v.to_bits()).collect();
+                let expected = expected.get_or_insert_with(|| bits.clone());
+                let name = kernel.name();
+                assert!(bits == *expected, "{scene:?}, {colors:?}, {name}");
+            }
+        }
     }
 }

@@ -31,6 +31,7 @@ mod parts;
 mod phong;
 mod profile;
 mod raster;
+mod renders;
 mod resume;
 mod same_bits;
 mod signs;

@@ -1,19 +1,12 @@
 //! Is `phong` the textbook's equation? It is evaluated here once more, in double precision and from the
 //! scene's numbers alone.
 
-use etendue::accel::Method;
-use etendue::color::Rgb;
-use etendue::description::{Kind, Properties};
 use etendue::image::Image;
-use etendue::integrator::{Context, Estimates, Estimator, Integrator, Start};
-use etendue::interaction::Ray;
 use etendue::relight::{self, Weight};
 use etendue::render::{Colors, Options, Overrides};
-use etendue::sampler::{Sampler, Stream};
-use etendue::scene::{self, Assets, light_names};
 use glam::DVec3;
 
-use crate::support::{Mean, describe, film, image_of, meter, path, rendered, scene};
+use crate::support::{Mean, film, image_of, meter, path, rendered, scene};
 
 /// The camera's place.
 const EYE: DVec3 = DVec3::new(0.0, 0.0, 5.0);
@@ -141,70 +134,37 @@ fn equation(p: DVec3, inverse_square: bool) -> Option<[f64; 3]> {
     Some(sum)
 }
 
-/// Radiance along rays from the eye through points of the plane z = 0.
-fn seen(text: &str, targets: &[DVec3]) -> Vec<[f32; 3]> {
-    let description = describe(text);
-    let assets = Assets::load(&description, None, None, &|| ()).unwrap();
-    let built = scene::build(&description, &assets, Rgb, Method::Tree).unwrap();
-    let child = |parent: &Properties<'_>, kind| parent.children(kind)[0].node_id();
-    let root = description.root();
-    let context = Context {
-        lights: light_names(&description),
-        ..Context::default()
+/// Points of the large sphere, as far as they are well defined, with the radiance that the eye sees there.
+fn seen(text: &str) -> Vec<(DVec3, [f32; 3])> {
+    let aov = r#"<integrator type="aov"><string name="aovs" value="p:position"/><integrator type="phong">"#;
+    let text = text.replace(r#"<integrator type="phong">"#, aov);
+    let text = text.replace("</integrator>", "</integrator></integrator>");
+    let overrides = Overrides {
+        spp: Some(1),
+        size: Some((40, 40)),
+        ..Overrides::default()
     };
-    let integrator = description.node(child(&root, Kind::Integrator));
-    let integrator = Integrator::<Rgb>::build(&integrator, &context).unwrap();
-    let sensor = description.node(child(&root, Kind::Sensor));
-    let sampler = Sampler::build(&description.node(child(&sensor, Kind::Sampler)), &()).unwrap();
-    let start = |target: &DVec3| Start {
-        ray: Ray {
-            origin: EYE.as_vec3(),
-            direction: (*target - EYE).normalize().as_vec3(),
-            t_max: f32::INFINITY,
-            time: 0.0,
-        },
-        wavelengths: (),
-        stream: Stream::new(1, 0, 0, 0),
-    };
-    let starts: Vec<_> = targets.iter().map(start).collect();
-    let mut estimates = Estimates::default();
-    integrator.estimate(
-        &built,
-        &sampler,
-        &starts,
-        &mut estimates,
-        &mut Default::default(),
-    );
-    estimates.values.iter().map(|e| e.radiance.0).collect()
+    let image = rendered(&text, &overrides, &Options::default()).image;
+    let channels = |names: [&str; 3]| names.map(|name| image.channel(name).unwrap());
+    let (rgb, xyz) = (channels(["R", "G", "B"]), channels(["p.X", "p.Y", "p.Z"]));
+    let pixels = image.data().chunks(image.channels().len());
+    let seen = pixels.map(|pixel| {
+        let p = DVec3::from(xyz.map(|c| f64::from(pixel[c])));
+        (p, rgb.map(|c| pixel[c]))
+    });
+    // Neither the surroundings nor the small sphere; and where a ray grazes the sphere, the point itself is ill-defined.
+    let on_sphere = |p: DVec3| (p.length() - 1.0).abs() < 1e-5;
+    let clear = |p: DVec3| p.normalize().dot((EYE - p).normalize()) > 0.2;
+    seen.filter(|(p, _)| on_sphere(*p) && clear(*p)).collect()
 }
 
 #[test]
 fn phong_is_the_equation_at_fifty_points_of_a_surface() {
-    let targets: Vec<DVec3> = (0..400)
-        .map(|i| {
-            DVec3::new(f64::from(i % 20), f64::from(i / 20), 0.0) / 10.0
-                - DVec3::new(0.95, 0.95, 0.0)
-        })
-        .collect();
     for (falloff, inverse_square) in [("none", false), ("inverse_square", true)] {
         let text = spheres(&format!(r#"<string name="falloff" value="{falloff}"/>"#));
         let (mut points, mut lit_by) = (0, [0; 3]);
         let mut worst: f64 = 0.0;
-        for (target, seen) in targets.iter().zip(seen(&text, &targets)) {
-            // The ray as it is in single precision; what it meets in double.
-            let direction = (*target - EYE).normalize().as_vec3().as_dvec3().normalize();
-            let (own, other) = (
-                meet(EYE, direction, DVec3::ZERO, 1.0),
-                meet(EYE, direction, BLOCKER.0, BLOCKER.1 * 1.001),
-            );
-            let (Some(t), None) = (own, other) else {
-                continue;
-            };
-            let p = EYE + t * direction;
-            // Where the ray grazes the sphere, the point itself is ill-defined.
-            if p.normalize().dot(-direction) < 0.2 {
-                continue;
-            }
+        for (p, seen) in seen(&text) {
             let Some(expected) = equation(p, inverse_square) else {
                 continue;
             };

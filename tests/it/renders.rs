@@ -7,11 +7,17 @@ use std::time::Duration;
 
 use glam::Vec3;
 
-use super::*;
-use crate::budget::Budget;
-use crate::description;
-use crate::mesh::read;
-use crate::sensor::Window;
+use etendue::budget::Budget;
+use etendue::color::luminance;
+use etendue::description::{self, Description};
+use etendue::error::Problem;
+use etendue::mesh::read;
+use etendue::render::{
+    Adaptive, BareMesh, Checkpoint, Completed, Options, Overrides, Phase, Progress, Session,
+    Silent, Staging, UpAxis, describe_mesh, render,
+};
+use etendue::sampler::Sampler;
+use etendue::sensor::Window;
 
 /// A small scene; `%` stands for what the test changes.
 const SCENE: &str = "<scene version='3.0.0'>
@@ -443,7 +449,7 @@ fn a_film_has_the_channels_of_its_format() {
     for (x, y) in (0..40).flat_map(|y| (0..70).map(move |x| (x, y))) {
         let color = [0, 1, 2].map(|c| rgb.get(x, y, c));
         assert_eq!(&rgba.pixel(x, y)[..3], color);
-        assert_eq!(grey.get(x, y, 0), crate::color::luminance(color));
+        assert_eq!(grey.get(x, y, 0), luminance(color));
         let alpha = rgba.get(x, y, 3);
         assert!((0.0..=1.000_001).contains(&alpha));
         covered |= alpha > 0.999;
@@ -593,7 +599,7 @@ fn an_adaptive_crop_has_the_pixels_of_the_whole_and_more_samples_where_it_is_noi
         adaptive: Some(ADAPTIVE),
         ..Options::default()
     };
-    for sampler in crate::sampler::Sampler::NAMES {
+    for sampler in Sampler::NAMES {
         let rendered = |crop| {
             let mut scene = place.scene(SCENE);
             let overrides = Overrides {
@@ -903,4 +909,43 @@ fn the_times_of_a_render_are_those_of_its_threads() {
     ];
     assert!(parts.iter().all(|part| *part > 0.0), "{parts:?}");
     assert!(parts.iter().sum::<f64>() <= seconds.render);
+}
+
+/// A square facing +z that shines, a camera at z = 3 that looks at `target`, and what `more` adds.
+fn warnings(target: &str, lamp: &str, integrator: &str) -> Vec<String> {
+    let text = format!(
+        "<scene version='3.0.0'><integrator type='{integrator}'/><sensor type='perspective'>
+            <transform name='to_world'><lookat origin='0, 0, 3' target='{target}' up='0, 1, 0'/></transform>
+            <film type='hdrfilm'><integer name='width' value='8'/><integer name='height' value='8'/></film>
+        </sensor><shape type='rectangle'>{lamp}</shape></scene>"
+    );
+    let scene =
+        Description::parse(&text, Path::new("a.xml"), &description::Options::default()).unwrap();
+    let rendered = render(&scene, &Options::default(), &Silent).unwrap();
+    let said = |problems: &[Problem]| -> Vec<String> {
+        problems.iter().map(|p| p.message.clone()).collect()
+    };
+    // What is known before rendering is what a check says.
+    let checked = Session::default().check(&scene, &Options::default(), &Silent);
+    let (checked, rendered) = (said(&checked.unwrap()), said(&rendered.warnings));
+    assert!(rendered.starts_with(&checked), "{checked:?} {rendered:?}");
+    rendered
+}
+
+const LAMP: &str = "<emitter type='area'/>";
+const TURNED: &str = "<emitter type='area'/><boolean name='flip_normals' value='true'/>";
+
+#[test]
+fn a_black_image_says_why() {
+    assert_eq!(warnings("0, 0, 0", LAMP, "path"), [""; 0]);
+    for (target, lamp, cause) in [
+        ("0, 0, 0", "", "no light"),
+        ("0, 0, 0", TURNED, "no light comes from them"),
+        ("0, 0, 9", LAMP, "sees nothing"),
+    ] {
+        let told = warnings(target, lamp, "path");
+        assert_eq!(told.len(), 1, "{told:?}");
+        assert!(told[0].contains(cause), "{told:?}");
+    }
+    assert_eq!(warnings("0, 0, 0", "", "depth"), [""; 0]);
 }
