@@ -25,8 +25,8 @@ pub(super) struct ImageArguments {
     #[arg(long, value_name = "X,Y,W,H", value_parser = parse::crop, help_heading = IMAGE)]
     crop: Option<Window>,
     /// Render N spectral bands over 360-830 nm instead of RGB; the image's RGB is made from them
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=MAX_BANDS as i64), help_heading = IMAGE)]
-    pub(super) bands: Option<u8>,
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=MAX_BANDS as i64), help_heading = IMAGE)]
+    pub(super) bands: Option<u16>,
     /// Bands from A to B nm; R, G and B are then those of the light in that range
     #[arg(long, value_name = "A,B", value_parser = parse::band_range, requires = "bands", help_heading = IMAGE)]
     pub(super) band_range: Option<[f32; 2]>,

@@ -17,23 +17,34 @@ use super::texels::Pixels;
 use super::upsample::Table;
 use crate::lanes::{Call, Ints as _, Kernel, Lanes, Task, Vec2};
 
-/// Up to `N` bands in `N` lanes; lanes in excess carry nothing.
+/// Bands of which a path carries up to `N` in `N` lanes; lanes in excess carry nothing. More bands take several passes.
 #[derive(Clone, Debug)]
 pub struct Bands<const N: usize> {
     comb: Comb,
+    /// The range in as many bands as a path carries.
+    carried: Comb,
     responses: Arc<[Response]>,
 }
 
 impl<const N: usize> Bands<N> {
-    /// The bands of a comb, and what a film makes of them: its channels, or the bands themselves where there are none;
-    /// `None` where there are more than `N`.
-    pub fn new(comb: Comb, responses: Arc<[Response]>) -> Option<Self> {
-        (comb.count() <= N).then_some(Self { comb, responses })
+    /// The bands of a comb, and what a film makes of them: its channels, or the bands themselves where there are none.
+    pub fn new(comb: Comb, responses: Arc<[Response]>) -> Self {
+        let passes = comb.count().div_ceil(N);
+        Self {
+            comb,
+            carried: comb.cut(comb.count().div_ceil(passes)),
+            responses,
+        }
     }
 
-    /// `count` bands over the visible range; `None` unless 1 ≤ count ≤ `N`.
+    /// `count` bands over the visible range; `None` unless 1 ≤ count ≤ [`MAX_BANDS`](super::MAX_BANDS).
     pub fn visible(count: usize) -> Option<Self> {
-        Self::new(Comb::new(count, super::VISIBLE)?, Arc::default())
+        Some(Self::new(Comb::new(count, super::VISIBLE)?, Arc::default()))
+    }
+
+    /// The bands of a pass, in the order of lanes.
+    fn bands_of(&self, pass: u32) -> impl Iterator<Item = usize> {
+        (pass as usize..self.comb.count()).step_by(self.passes() as usize)
     }
 }
 
@@ -54,17 +65,27 @@ impl<const N: usize> ColorModel for Bands<N> {
     type Columns<F: Lanes> = Columns<F, N>;
 
     fn run<T: Task>(kernel: Kernel, task: T) -> T::Output {
-        // Sixteen lanes of more channels take longer to compile than they save.
-        match N <= 32 {
-            true => kernel.run_many(task),
-            false => kernel.run_single(task),
-        }
+        kernel.run_many(task)
+    }
+
+    fn passes(&self) -> u32 {
+        self.comb.count().div_ceil(self.carried.count()) as u32
     }
 
     #[inline]
     fn wavelengths(&self, u: impl FnOnce() -> f32) -> [f32; N] {
-        let (u, count) = (u(), self.comb.count());
-        std::array::from_fn(|i| self.comb.wavelength(if i < count { i } else { 0 }, u))
+        let (u, count) = (u(), self.carried.count());
+        std::array::from_fn(|i| self.carried.wavelength(if i < count { i } else { 0 }, u))
+    }
+
+    #[inline]
+    fn wavelengths_of(&self, pass: u32, u: impl FnOnce() -> f32) -> [f32; N] {
+        let u = u();
+        let mut wavelengths = [self.comb.wavelength(pass as usize, u); N];
+        for (wavelength, band) in wavelengths.iter_mut().zip(self.bands_of(pass)) {
+            *wavelength = self.comb.wavelength(band, u);
+        }
+        wavelengths
     }
 
     #[inline(always)]
@@ -78,7 +99,7 @@ impl<const N: usize> ColorModel for Bands<N> {
     }
 
     fn unit(&self) -> Samples<N> {
-        Samples::from_fn(|i| if i < self.comb.count() { 1.0 } else { 0.0 })
+        Samples::from_fn(|i| if i < self.carried.count() { 1.0 } else { 0.0 })
     }
 
     fn store(&self, color: &Color, role: Role) -> Result<Spectrum, String> {
@@ -173,7 +194,7 @@ impl<const N: usize> ColorModel for Bands<N> {
 
     fn luminance(&self, sample: &Samples<N>, wavelengths: &[f32; N]) -> f32 {
         let (mut sum, mut white) = (0.0, 0.0);
-        for i in 0..self.comb.count() {
+        for i in 0..self.carried.count() {
             let weight = cie::xyz(wavelengths[i])[1];
             sum += weight * sample[i];
             white += weight;
@@ -190,15 +211,17 @@ impl<const N: usize> ColorModel for Bands<N> {
         names
     }
 
-    fn develop(&self, sample: &Samples<N>, wavelengths: &[f32; N], out: &mut [f32]) {
+    fn develop(&self, pass: u32, sample: &Samples<N>, wavelengths: &[f32; N], out: &mut [f32]) {
         let nodes = observer();
         let mut rgb = [0.0; 3];
-        let count = self.comb.count();
-        for i in 0..count {
-            let Some((node, t)) = cie::locate(wavelengths[i]) else {
+        // The last pass may have a lane that is no band's.
+        let count = self.bands_of(pass).count();
+        let (values, wavelengths) = (&sample.0[..count], &wavelengths[..count]);
+        for (value, wavelength) in values.iter().zip(wavelengths) {
+            let Some((node, t)) = cie::locate(*wavelength) else {
                 continue;
             };
-            let (a, b) = (sample[i] * (1.0 - t), sample[i] * t);
+            let (a, b) = (value * (1.0 - t), value * t);
             for c in 0..3 {
                 rgb[c] += a * nodes[node][c] + b * nodes[node + 1][c];
             }
@@ -206,9 +229,11 @@ impl<const N: usize> ColorModel for Bands<N> {
         for c in 0..3 {
             out[c] = rgb[c] * self.comb.width();
         }
-        let (values, wavelengths) = (&sample.0[..count], &wavelengths[..count]);
         if self.responses.is_empty() {
-            out[3..3 + count].copy_from_slice(values);
+            out[3..3 + self.comb.count()].fill(0.0);
+            for (band, value) in self.bands_of(pass).zip(values) {
+                out[3 + band] = *value;
+            }
         }
         for (out, response) in out[3..].iter_mut().zip(self.responses.iter()) {
             *out = response.of(&self.comb, values, wavelengths);
@@ -277,13 +302,15 @@ mod tests {
         let mut sum = [0.0; 3];
         let n = 200;
         for i in 0..n {
-            let w = bands.wavelengths(|| (i as f32 + 0.5) / n as f32);
-            let mut out = vec![0.0; 3 + count];
-            let value =
-                Bands::<N>::evaluate(&color, &w) * Bands::<N>::evaluate(&light, &w) * bands.unit();
-            bands.develop(&value, &w, &mut out);
-            for c in 0..3 {
-                sum[c] += f64::from(out[c]) / f64::from(n);
+            for pass in 0..bands.passes() {
+                let w = bands.wavelengths_of(pass, || (i as f32 + 0.5) / n as f32);
+                let mut out = vec![0.0; 3 + count];
+                let light = Bands::<N>::evaluate(&light, &w);
+                let value = Bands::<N>::evaluate(&color, &w) * light * bands.unit();
+                bands.develop(pass, &value, &w, &mut out);
+                for c in 0..3 {
+                    sum[c] += f64::from(out[c]) / f64::from(n);
+                }
             }
         }
         sum
@@ -303,11 +330,34 @@ mod tests {
                 rgb_of::<8>(8, &one, Role::Quantity, &color),
                 rgb_of::<16>(11, &one, Role::Quantity, &color),
                 rgb_of::<32>(32, &one, Role::Quantity, &color),
+                rgb_of::<8>(19, &one, Role::Quantity, &color),
             ] {
                 for c in 0..3 {
                     assert!(
                         (result[c] / expected[c] - 1.0).abs() < 0.01,
                         "{color:?} {result:?} {expected:?}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn each_band_is_in_one_pass() {
+        for count in [1, 7, 8, 9, 17, 100] {
+            let bands = Bands::<8>::visible(count).unwrap();
+            let mut all: Vec<usize> = (0..bands.passes())
+                .flat_map(|p| bands.bands_of(p))
+                .collect();
+            all.sort_unstable();
+            assert!(all.into_iter().eq(0..count), "{count}");
+            for pass in 0..bands.passes() {
+                let wavelengths = bands.wavelengths_of(pass, || 0.5);
+                for (lane, band) in bands.bands_of(pass).enumerate() {
+                    assert_eq!(
+                        wavelengths[lane],
+                        bands.comb.wavelength(band, 0.5),
+                        "{count}"
                     );
                 }
             }

@@ -1,4 +1,4 @@
-//! A comb of wavelengths: a range cut into equal bands, of which a path carries one wavelength each, all moved inside
+//! A comb of wavelengths: a range cut into equal bands, of which paths carry one wavelength each, all moved inside
 //! their bands by one number.
 
 use super::cie;
@@ -11,8 +11,8 @@ pub struct Comb {
     last: f32,
 }
 
-/// The most bands that one path carries.
-pub const MAX_BANDS: usize = 64;
+/// The most bands of an image.
+pub const MAX_BANDS: usize = 1024;
 
 /// The visible range, in nm, over which the observer's curves are known.
 pub const VISIBLE: [f32; 2] = [cie::FIRST, cie::LAST];
@@ -24,6 +24,11 @@ impl Comb {
         let fits = (1..=MAX_BANDS).contains(&count);
         let rises = first > 0.0 && last > first && last.is_finite();
         (fits && rises).then_some(Self { count, first, last })
+    }
+
+    /// The same range in so many bands.
+    pub(super) fn cut(self, count: usize) -> Self {
+        Self { count, ..self }
     }
 
     /// How many bands.
@@ -66,7 +71,7 @@ mod tests {
     fn what_is_no_comb_is_none() {
         for (count, range) in [
             (0, VISIBLE),
-            (65, VISIBLE),
+            (MAX_BANDS + 1, VISIBLE),
             (4, [500.0, 500.0]),
             (4, [0.0, 500.0]),
             (4, [500.0, f32::INFINITY]),

@@ -62,8 +62,21 @@ pub trait ColorModel: Clone + std::fmt::Debug + Send + Sync + 'static {
     /// more would take all the registers there are, and twice as long to compile.
     fn run<T: Task>(kernel: Kernel, task: T) -> T::Output;
 
-    /// The wavelengths of a path, from a random number in [0, 1), which is drawn where there are any.
+    /// How many paths a sample takes: more than one where there are more bands than a path carries.
+    fn passes(&self) -> u32 {
+        1
+    }
+
+    /// Wavelengths as a path carries them, evenly over the whole range, from a random number in [0, 1), which is drawn where
+    /// there are any.
     fn wavelengths(&self, u: impl FnOnce() -> f32) -> Self::Wavelengths;
+
+    /// The wavelengths of a sample's path of that pass: among the bands every so manieth, so that each pass sees all of the
+    /// range.
+    fn wavelengths_of(&self, _pass: u32, u: impl FnOnce() -> f32) -> Self::Wavelengths {
+        self.wavelengths(u)
+    }
+
     /// The wavelengths of a path that goes on with `throughput`: where a single one carries anything, all are that one, so
     /// that a boundary that parts wavelengths does not part it again.
     #[inline(always)]
@@ -149,8 +162,15 @@ pub trait ColorModel: Clone + std::fmt::Debug + Send + Sync + 'static {
 
     /// The channels of an image: `R`, `G`, `B`, and one a band.
     fn channels(&self) -> Vec<String>;
-    /// Writes a sample's value for each of [`Self::channels`] to the start of `out`.
-    fn develop(&self, sample: &Self::Sample, wavelengths: &Self::Wavelengths, out: &mut [f32]);
+    /// Writes what a sample's path of that pass brings to each of [`Self::channels`] to the start of `out`: all passes' are
+    /// added up.
+    fn develop(
+        &self,
+        pass: u32,
+        sample: &Self::Sample,
+        wavelengths: &Self::Wavelengths,
+        out: &mut [f32],
+    );
 }
 
 /// The luminance of linear BT.709.

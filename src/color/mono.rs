@@ -81,7 +81,7 @@ impl ColorModel for Mono {
         vec!["Y".into()]
     }
 
-    fn develop(&self, sample: &Samples<1>, _wavelengths: &(), out: &mut [f32]) {
+    fn develop(&self, _pass: u32, sample: &Samples<1>, _wavelengths: &(), out: &mut [f32]) {
         out[0] = sample.0[0];
     }
 }

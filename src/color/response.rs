@@ -21,7 +21,7 @@ impl Response {
         both.unwrap_or(VISIBLE)
     }
 
-    /// What the channel makes of values at the wavelengths of a comb, one a band.
+    /// What the channel makes of values at some of the wavelengths of a comb.
     pub(super) fn of(&self, comb: &Comb, values: &[f32], wavelengths: &[f32]) -> f32 {
         let products = values.iter().zip(wavelengths);
         let sum: f64 = products

@@ -108,7 +108,7 @@ impl ColorModel for Rgb {
     }
 
     #[inline]
-    fn develop(&self, sample: &Samples<3>, _wavelengths: &(), out: &mut [f32]) {
+    fn develop(&self, _pass: u32, sample: &Samples<3>, _wavelengths: &(), out: &mut [f32]) {
         out[..3].copy_from_slice(&sample.0);
     }
 }

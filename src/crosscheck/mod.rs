@@ -57,7 +57,7 @@ pub struct Settings {
     /// Mitsuba's variant, such as `scalar_rgb`.
     pub variant: String,
     /// How many spectral bands Étendue renders; RGB where absent.
-    pub bands: Option<u8>,
+    pub bands: Option<u16>,
     /// What Mitsuba renders in place of the scene: the same in words that it knows.
     pub reference: Option<PathBuf>,
     /// Values of the scene's parameters.

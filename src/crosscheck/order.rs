@@ -38,7 +38,7 @@ pub(super) struct Order {
     /// One a processor where absent.
     pub(super) threads: Option<u32>,
     /// Étendue's colour model; RGB where absent.
-    pub(super) bands: Option<u8>,
+    pub(super) bands: Option<u16>,
     /// Mitsuba's variant.
     pub(super) variant: String,
     /// A folder of Python files that register plugins with Mitsuba.

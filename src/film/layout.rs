@@ -69,6 +69,12 @@ impl Layout {
         self.colors..self.opacity()
     }
 
+    /// Whether a channel is light or a colour, of which each pass over the bands brings a part; of others each brings all.
+    pub(crate) fn adds_up(&self, channel: usize) -> bool {
+        let is_color = |name: &str| [".R", ".G", ".B"].iter().any(|end| name.ends_with(end));
+        channel < self.colors || is_color(&self.names[channel])
+    }
+
     /// Where opacity is.
     pub(crate) fn opacity(&self) -> usize {
         self.names.len() - 1

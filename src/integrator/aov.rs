@@ -214,7 +214,7 @@ impl<C: ColorModel> Estimator<C> for Aov<C> {
                     let Estimate { radiance, alpha } = &child.values[i];
                     scene
                         .color()
-                        .develop(radiance, &start.wavelengths, &mut developed);
+                        .develop(start.pass, radiance, &start.wavelengths, &mut developed);
                     estimates.extra.extend_from_slice(&developed[..3]);
                     estimates.extra.push(*alpha);
                 }
@@ -249,7 +249,9 @@ impl<C: ColorModel> Aov<C> {
             Quantity::Albedo => {
                 let mut row = vec![0.0; scene.color().channels().len()];
                 let albedo = scene.material(at).albedo(at, &start.wavelengths);
-                scene.color().develop(&albedo, &start.wavelengths, &mut row);
+                scene
+                    .color()
+                    .develop(start.pass, &albedo, &start.wavelengths, &mut row);
                 [row[0], row[1], row[2]]
             }
             Quantity::Depth => [at.t, 0.0, 0.0],

@@ -151,6 +151,7 @@ impl<C: ColorModel> LightPaths<'_, C> {
                     t_max: f32::INFINITY,
                     time: start.ray.time,
                 },
+                pass: start.pass,
                 wavelengths: start.wavelengths,
                 stream,
             });

@@ -51,6 +51,8 @@ pub(crate) use raster::Raster;
 pub struct Start<C: ColorModel> {
     /// The camera's ray.
     pub ray: Ray,
+    /// Which of the sample's paths it is, where colours take several.
+    pub pass: u32,
     /// The path's wavelengths.
     pub wavelengths: C::Wavelengths,
     /// The path's random numbers.

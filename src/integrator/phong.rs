@@ -200,8 +200,10 @@ impl<C: ColorModel> Estimator<C> for Phong {
         estimates.extra.clear();
         let mut developed = vec![0.0; scene.color().channels().len()];
         for (i, sum) in sums.iter().enumerate() {
-            let w = &starts[i / count].wavelengths;
-            scene.color().develop(sum, w, &mut developed);
+            let Start {
+                pass, wavelengths, ..
+            } = &starts[i / count];
+            (scene.color()).develop(*pass, sum, wavelengths, &mut developed);
             estimates.extra.extend_from_slice(&developed[..3]);
         }
     }

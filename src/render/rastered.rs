@@ -54,7 +54,8 @@ struct Picture<'a, C: ColorModel> {
     projection: Projection,
     drawn: Drawn<'a>,
     seen: Visibility,
-    shader: Shader<'a, C>,
+    /// One a pass over the bands.
+    shaders: Vec<Shader<'a, C>>,
     time: f32,
 }
 
@@ -88,13 +89,17 @@ pub(super) fn draw<C: ColorModel>(
         cull: raster.cull,
     };
     let seen = Visibility::draw(&drawn, &projection, &canvas)?;
-    let wavelengths = scene.color().wavelengths(|| 0.5);
-    let shader = Shader::new(scene, raster.shade, wavelengths, time);
     let casters = Drawn::new(tracer, &projection, time, |shape| {
         !is_clear(shape) && !scene.shines(shape)
     })?;
+    let shader = |pass| {
+        let wavelengths = scene.color().wavelengths_of(pass, || 0.5);
+        Shader::new(scene, raster.shade, wavelengths, time).with_maps(&casters)
+    };
     let picture = Picture {
-        shader: shader.with_maps(&casters)?,
+        shaders: (0..scene.color().passes())
+            .map(shader)
+            .collect::<Result<_>>()?,
         layout: Layout::new(scene.color().channels(), Vec::new()),
         scene,
         view,
@@ -208,9 +213,15 @@ impl<C: ColorModel> Picture<'_, C> {
         let mut row = vec![0.0; self.layout.count()];
         for y in top..top + window.height {
             for x in 0..crop.width {
-                self.pixel([x, y], &mut row);
-                for (column, value) in columns.iter_mut().zip(&row) {
-                    column[0] = *value;
+                for pass in 0..self.shaders.len() {
+                    self.pixel([x, y], pass, &mut row);
+                    for (channel, (column, value)) in columns.iter_mut().zip(&row).enumerate() {
+                        if pass == 0 {
+                            column[0] = *value;
+                        } else if self.layout.adds_up(channel) {
+                            column[0] += *value;
+                        }
+                    }
                 }
                 let group = Group {
                     pixel: [crop.x + x, crop.y + y],
@@ -225,7 +236,8 @@ impl<C: ColorModel> Picture<'_, C> {
 
     /// The values of a pixel: each triangle in it is shaded where the first of its samples lies, or in the pixel's centre where
     /// all samples are its own.
-    fn pixel(&self, [x, y]: [u32; 2], row: &mut [f32]) {
+    fn pixel(&self, [x, y]: [u32; 2], pass: usize, row: &mut [f32]) {
+        let shader = &self.shaders[pass];
         let pixel = y as usize * self.film.crop.width as usize + x as usize;
         let pattern = &self.raster.pattern;
         let count = pattern.count();
@@ -249,26 +261,26 @@ impl<C: ColorModel> Picture<'_, C> {
                 x: left, y: top, ..
             } = self.film.crop;
             let place = DVec2::new(f64::from(left + x) + dx, f64::from(top + y) + dy);
-            let (color, opaque) = self.sample(place, *number);
+            let (color, opaque) = self.sample(shader, place, *number);
             let weight = share as f32 / count as f32;
             sum += color * weight;
             alpha += opaque * weight;
         }
         let color = self.scene.color();
-        color.develop(&sum, self.shader.wavelengths(), row);
+        color.develop(pass as u32, &sum, shader.wavelengths(), row);
         if let Some(last) = row.last_mut() {
             *last = alpha;
         }
     }
 
-    fn sample(&self, place: DVec2, number: Option<u32>) -> (C::Sample, f32) {
+    fn sample(&self, shader: &Shader<C>, place: DVec2, number: Option<u32>) -> (C::Sample, f32) {
         let ray = self.ray(place);
         match number {
-            None => self.shader.background(&ray),
+            None => shader.background(&ray),
             Some(number) => {
                 let fragment = Fragment::new(&self.drawn, &self.projection, number, place);
                 let is_perspective = self.projection.is_perspective();
-                (self.shader.fragment(&ray, &fragment, is_perspective), 1.0)
+                (shader.fragment(&ray, &fragment, is_perspective), 1.0)
             }
         }
     }

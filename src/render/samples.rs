@@ -78,7 +78,7 @@ struct Batch<'a, C: ColorModel> {
     estimates: Estimates<C::Sample>,
     /// A sample's colours.
     row: Vec<f32>,
-    /// A group's values, a row a channel.
+    /// The groups' values, for each a row a channel.
     columns: Vec<[f32; GROUP]>,
     cost: Cost,
     /// Time that colours and the film took.
@@ -89,45 +89,75 @@ impl<C: ColorModel> Batch<'_, C> {
     fn flush<S: Sink>(&mut self, sink: &mut S) {
         let before = self.cost.stats.rays();
         let (scene, integrator) = (self.job.scene, &self.job.view.integrator);
-        let (starts, estimates) = (&self.starts, &mut self.estimates);
-        integrator.estimate(scene, self.sampler, starts, estimates, &mut self.cost);
+        let color = scene.color();
+        let count = self.layout.count();
+        self.columns.resize(self.groups.len() * count, [0.0; GROUP]);
+        for pass in 0..color.passes() {
+            if pass > 0 {
+                for start in &mut self.starts {
+                    let number = || start.stream.number(self.sampler, WAVELENGTH);
+                    start.wavelengths = color.wavelengths_of(pass, number);
+                    start.pass = pass;
+                }
+            }
+            let (starts, estimates) = (&self.starts, &mut self.estimates);
+            integrator.estimate(scene, self.sampler, starts, estimates, &mut self.cost);
+            let estimated = Instant::now();
+            self.develop(pass);
+            self.splat(pass, sink);
+            self.film += estimated.elapsed();
+        }
         let estimated = Instant::now();
-        let (layout, color) = (&self.layout, scene.color());
-        let extra = layout.extra().len();
+        for (group, columns) in self.groups.iter().zip(self.columns.chunks_exact(count)) {
+            sink.take(scene.tracer().kernel(), group, columns);
+        }
+        self.film += estimated.elapsed();
+        let rays = self.cost.stats.rays() - before;
+        self.progress.advance(self.starts.len() as u64, rays);
+        self.starts.clear();
+        self.groups.clear();
+    }
+
+    /// Adds what the estimates of a pass bring to the columns.
+    fn develop(&mut self, pass: u32) {
+        let (color, layout) = (self.job.scene.color(), &self.layout);
+        let (count, extra) = (layout.count(), layout.extra().len());
         self.row.resize(layout.colors().len(), 0.0);
-        self.columns.resize(layout.count(), [0.0; GROUP]);
-        let mut first = 0;
+        let mut index = 0;
         let weighted = !self.job.view.sensor.is_projective();
-        for group in &self.groups {
+        for (number, group) in self.groups.iter().enumerate() {
+            let columns = &mut self.columns[number * count..][..count];
             for sample in 0..group.count {
-                let index = first + sample;
-                let Estimate { radiance, alpha } = &estimates.values[index];
-                color.develop(radiance, &starts[index].wavelengths, &mut self.row);
+                let Estimate { radiance, alpha } = &self.estimates.values[index];
+                let wavelengths = &self.starts[index].wavelengths;
+                color.develop(pass, radiance, wavelengths, &mut self.row);
                 if weighted {
                     let weight = weight(&self.job.view, group, sample);
                     self.row.iter_mut().for_each(|value| *value *= weight);
                 }
-                let extra = &estimates.extra[index * extra..][..extra];
+                let extra = &self.estimates.extra[index * extra..][..extra];
                 let values = self.row.iter().chain(extra).chain([alpha]);
-                for (column, value) in self.columns.iter_mut().zip(values) {
-                    column[sample] = *value;
+                for (channel, (column, value)) in columns.iter_mut().zip(values).enumerate() {
+                    if pass == 0 {
+                        column[sample] = *value;
+                    } else if layout.adds_up(channel) {
+                        column[sample] += *value;
+                    }
                 }
+                index += 1;
             }
-            first += group.count;
-            sink.take(scene.tracer().kernel(), group, &self.columns);
         }
+    }
+
+    /// Gives the light of a pass that came to the film from lights to the sink.
+    fn splat<S: Sink>(&mut self, pass: u32, sink: &mut S) {
         let place = Place::of(&self.job.view.film);
         for splat in &self.estimates.splats {
-            let wavelengths = &starts[splat.start as usize].wavelengths;
-            color.develop(&splat.value, wavelengths, &mut self.row);
+            let wavelengths = &self.starts[splat.start as usize].wavelengths;
+            (self.job.scene.color()).develop(pass, &splat.value, wavelengths, &mut self.row);
             self.row.iter_mut().for_each(|value| *value *= place.share);
             sink.splat(place.on(splat.film), &self.row);
         }
-        self.film += estimated.elapsed();
-        let rays = self.cost.stats.rays() - before;
-        self.progress.advance(starts.len() as u64, rays);
-        self.starts.clear();
-        self.groups.clear();
     }
 }
 
@@ -233,7 +263,8 @@ impl<C: ColorModel> Task for CameraSamples<'_, C> {
                 let number = || stream.number(self.sampler, WAVELENGTH);
                 self.starts.push(Start {
                     ray,
-                    wavelengths: self.job.scene.color().wavelengths(number),
+                    pass: 0,
+                    wavelengths: self.job.scene.color().wavelengths_of(0, number),
                     stream: *stream,
                 });
             });

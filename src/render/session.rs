@@ -25,7 +25,7 @@ use super::provenance::{self, Provenance};
 use super::uniform;
 use super::{Parted, Rendered, Report, rastered, timed};
 #[cfg(all(feature = "bands", not(test)))]
-use crate::color::{Bands, MAX_BANDS};
+use crate::color::Bands;
 use crate::color::{ColorModel, Comb, Response, Rgb};
 use crate::description::Description;
 use crate::error::{Error, Problem, Result};
@@ -72,14 +72,10 @@ pub(super) trait Task: Sized {
 /// Unit tests render in RGB alone, for they would take twice as long to compile: `tests/it` renders in bands.
 #[cfg(all(feature = "bands", not(test)))]
 fn in_bands<T: Task>(task: T, comb: Comb, responses: Arc<[Response]>) -> Result<T::Output> {
-    fn bands<const N: usize>(comb: Comb, responses: Arc<[Response]>) -> Bands<N> {
-        Bands::new(comb, responses).expect("so many bands fit")
-    }
     match comb.count() {
-        ..=8 => task.run(bands::<8>(comb, responses)),
-        9..=16 => task.run(bands::<16>(comb, responses)),
-        17..=32 => task.run(bands::<32>(comb, responses)),
-        _ => task.run(bands::<MAX_BANDS>(comb, responses)),
+        ..=8 => task.run(Bands::<8>::new(comb, responses)),
+        9..=16 => task.run(Bands::<16>::new(comb, responses)),
+        _ => task.run(Bands::<32>::new(comb, responses)),
     }
 }
 

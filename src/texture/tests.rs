@@ -24,14 +24,14 @@ fn built<C: ColorModel>(spectrum: &str, palette: &Palette<C>, role: Role) -> Res
 /// The RGB that paths in bands make of a spectrum as light, averaged over shifts of the comb.
 fn seen(spectrum: &str, role: Role) -> [f32; 3] {
     const SHIFTS: u16 = 200;
-    let bands = Bands::<16>::visible(16).expect("16 bands fit");
+    let bands = Bands::<8>::visible(8).expect("8 bands fit");
     let texture = built(spectrum, &Palette::new(bands.clone()), role).unwrap();
     let mut sum = [0.0; 3];
     for i in 0..SHIFTS {
         let wavelengths = bands.wavelengths(|| (f32::from(i) + 0.5) / f32::from(SHIFTS));
         let value = texture.eval(&Interaction::at_uv(Vec2::ZERO), &wavelengths);
-        let mut out = [0.0; 19];
-        bands.develop(&value, &wavelengths, &mut out);
+        let mut out = [0.0; 11];
+        bands.develop(0, &value, &wavelengths, &mut out);
         for (sum, v) in sum.iter_mut().zip(out) {
             *sum += v / f32::from(SHIFTS);
         }

@@ -99,15 +99,44 @@ fn the_parts_of_a_range_add_up_to_its_colour() {
     assert_eq!(names[3], "S0.370,555556nm");
 }
 
+/// More bands than a path carries: light adds up, and what is no light does not.
+#[test]
+fn several_passes_come_to_what_one_comes_to() {
+    let aov = r#"<integrator type="aov"><string name="aovs" value="albedo:albedo,d:depth"/>
+        <integer name="max_depth" value="3"/><integrator type="path" name="nested"/></integrator>"#;
+    let text = scene(&format!(
+        r#"{aov}<sensor type="perspective"><float name="fov" value="40"/>
+            <transform name="to_world"><lookat origin="0, 0, 4" target="0, 0, 0" up="0, 1, 0"/></transform>{}</sensor>
+        <emitter type="point"><point name="position" value="3, 2, 4"/>
+            <rgb name="intensity" value="100"/></emitter>
+        <shape type="sphere"><bsdf type="diffuse"><rgb name="reflectance" value="0.8, 0.4, 0.2"/></bsdf></shape>"#,
+        film(16, 16, 64)
+    ));
+    let [one, several] = [16, 65].map(|count| in_bands(&text, count, None, 5));
+    let mean = |image: &Image, name: &str| {
+        let channel = image.channels().iter().position(|other| other == name);
+        Mean::of_channel(image, channel.expect(name)).value
+    };
+    for name in [
+        "R", "G", "B", "albedo.R", "albedo.G", "albedo.B", "d.T", "nested.R", "nested.A",
+    ] {
+        let (expected, found) = (mean(&one, name), mean(&several, name));
+        assert!(
+            expected > 0.01 && (found / expected - 1.0).abs() < 0.02,
+            "{name}: {found} {expected}"
+        );
+    }
+}
+
 /// A ball of a substance before an even sky, which it lets through whole.
-fn ball(bsdf: &str) -> String {
+fn ball(bsdf: &str, spp: u32) -> String {
     scene(&format!(
         r#"{}<sensor type="perspective"><float name="fov" value="30"/>
             <transform name="to_world"><lookat origin="0, 0, 4" target="0, 0, 0" up="0, 1, 0"/></transform>{}</sensor>
         <emitter type="constant"><spectrum name="radiance" value="1"/></emitter>
         <shape type="sphere">{bsdf}</shape>"#,
         path(-1),
-        film(24, 24, 256)
+        film(24, 24, spp)
     ))
 }
 
@@ -119,8 +148,8 @@ fn what_parts_wavelengths_loses_none() {
         format!(r#"<bsdf type="dielectric">{flint}</bsdf>"#),
         format!(r#"<bsdf type="thindielectric">{flint}</bsdf>"#),
     ] {
-        for count in [3, 16] {
-            for (name, mean) in means(&in_bands(&ball(&bsdf), count, None, 3)) {
+        for (count, spp) in [(3, 256), (16, 256), (65, 512)] {
+            for (name, mean) in means(&in_bands(&ball(&bsdf, spp), count, None, 3)) {
                 mean.assert_is(1.0, 0.02, &format!("{bsdf} {name} of {count}"));
             }
         }
@@ -144,7 +173,7 @@ fn a_narrow_band_refracts_by_its_own_index() {
         .sqrt()
     };
     let lit = |bsdf: &str| {
-        ball(bsdf).replace(
+        ball(bsdf, 256).replace(
             r#"<emitter type="constant">"#,
             r#"<emitter type="point"><point name="position" value="1, 2, 3"/></emitter><emitter type="constant">"#,
         )
@@ -191,7 +220,7 @@ fn rough_glass_in_bands_is_each_band_s_own() {
     let bsdf = |inside: &str| {
         ball(&format!(
             r#"<bsdf type="roughdielectric"><float name="alpha" value="0.3"/>{inside}</bsdf>"#
-        ))
+        ), 256)
         .replace(r#"value="1"/>"#, r#"value="0.2"/>"#)
         .replace(
             "</scene>",
@@ -249,9 +278,8 @@ fn indices_that_cannot_be_are_refused() {
             "the same everywhere",
         ),
     ] {
-        let description = describe(&ball(&format!(
-            r#"<bsdf type="dielectric">{inside}</bsdf>"#
-        )));
+        let bsdf = format!(r#"<bsdf type="dielectric">{inside}</bsdf>"#);
+        let description = describe(&ball(&bsdf, 256));
         let options = Options {
             colors: Colors::bands(8),
             ..Options::default()

@@ -494,7 +494,7 @@ const CASES: &[Case<'static>] = &[
         2,
         &["--foveate", "--noise-threshold"],
     ),
-    usage("65 bands", "--bands 65", 2, &["65"]),
+    usage("1025 bands", "--bands 1025", 2, &["1025"]),
     usage("a definition without a value", "-D spp", 2, &["name=value"]),
     usage("threads below none", "--threads=-1", 2, &["--threads"]),
     usage(

@@ -13,8 +13,8 @@ use etendue::description::{self, Description};
 use etendue::error::Problem;
 use etendue::mesh::read;
 use etendue::render::{
-    Adaptive, BareMesh, Checkpoint, Completed, Options, Overrides, Phase, Progress, Session,
-    Silent, Staging, UpAxis, describe_mesh, render,
+    Adaptive, BareMesh, Checkpoint, Completed, Options, Overrides, Phase, Progress, Rendered,
+    Session, Silent, Staging, UpAxis, describe_mesh, render,
 };
 use etendue::sampler::Sampler;
 use etendue::sensor::Window;
@@ -736,7 +736,7 @@ fn gazing() -> Options {
 #[test]
 fn samples_fall_with_the_distance_from_a_gaze_where_they_are_those_of_a_render_without() {
     let place = Place::new();
-    for sampler in crate::sampler::Sampler::NAMES {
+    for sampler in Sampler::NAMES {
         let scene = wide(&place, "<rfilter type='box'/>", sampler, 32);
         let rendered = |options: &Options| render(&scene, options, &Silent).unwrap();
         let uniform = rendered(&Options::default()).image;
