@@ -40,13 +40,15 @@ pub(super) struct SceneArguments {
     #[command(flatten)]
     read: ReadArguments,
     /// Which way is up in a bare mesh
-    #[arg(long, value_enum, default_value_t = Up::Y)]
+    #[arg(long, value_enum, default_value_t = Up::Auto)]
     up: Up,
 }
 
 /// Which way is up.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum Up {
+    /// As the format has it, unless the mesh would stand far better on its other side
+    Auto,
     /// +y
     Y,
     /// +z
@@ -140,6 +142,7 @@ impl SceneArguments {
     /// Which way is up in a bare mesh.
     pub(super) fn up_axis(&self) -> UpAxis {
         match self.up {
+            Up::Auto => UpAxis::Auto,
             Up::Y => UpAxis::Y,
             Up::Z => UpAxis::Z,
         }

@@ -197,7 +197,12 @@ impl Mesh {
     /// Replaces the vertex normals by the mean of the faces' normals, weighted with the faces' angles at the
     /// vertex. Call it after [`Mesh::transform`], as Mitsuba does.
     pub fn compute_normals(&mut self) {
-        self.normals = normals::angle_weighted(&self.positions, &self.triangles);
+        self.normals = self.mean_normals();
+    }
+
+    /// The normals of [`Mesh::compute_normals`].
+    pub(crate) fn mean_normals(&self) -> Vec<Vec3> {
+        normals::angle_weighted(&self.positions, &self.triangles)
     }
 
     /// Shades with the geometric normal (`face_normals`).

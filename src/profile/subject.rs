@@ -120,8 +120,8 @@ impl Stage {
                     )));
                 }
                 Source::Mesh {
+                    up: up.of(path, &mesh).direction(),
                     mesh,
-                    up: up.direction(),
                 }
             }
             Subject::Scene { path, options } => {

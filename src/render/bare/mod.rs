@@ -5,6 +5,7 @@
 mod frame;
 mod lights;
 mod staging;
+mod upright;
 
 use std::path::Path;
 
@@ -96,6 +97,10 @@ pub fn describe_mesh(
         );
         return Err(Error::input(message).at(&Location::of_file(path)));
     }
+    let staging = &Staging {
+        up: staging.up.of(path, &loaded.mesh),
+        ..staging.clone()
+    };
     let own = staging.own_material(options, budget)?;
     for message in unseen(&loaded.mesh) {
         let warning = Error::input(message).at(&Location::of_file(path));
@@ -304,8 +309,13 @@ fn scene(subject: &Subject<'_>, file: &Path, bare: bool, material: &str) -> Stri
             String::new()
         },
         file = escaped(&file.to_string_lossy()),
-        // A glTF without normals is meant to be flat; other formats leave them to be computed.
-        flat = plugin == "gltf" && mesh.normals.is_empty(),
+        // A glTF without normals is meant to be flat; other formats leave them to be computed, which would round off the
+        // parts of machines that STL is for.
+        flat = match plugin {
+            "gltf" => mesh.normals.is_empty(),
+            "stl" => upright::is_angular(mesh),
+            _ => false,
+        },
         bare = if bare {
             "\n        <boolean name=\"bare\" value=\"true\"/>"
         } else {

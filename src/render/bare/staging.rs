@@ -13,18 +13,20 @@ use crate::mesh::GltfLight;
 /// Which way is up in a mesh file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum UpAxis {
-    /// +y, as most scanned and modelled meshes have it.
+    /// As the format has it, or by what the mesh stands on.
     #[default]
+    Auto,
+    /// +y, as most scanned and modelled meshes have it.
     Y,
     /// +z, as CAD and terrain have it.
     Z,
 }
 
 impl UpAxis {
-    /// Of unit length.
+    /// Of unit length; +y until the mesh is known.
     pub fn direction(self) -> Vec3 {
         match self {
-            Self::Y => Vec3::Y,
+            Self::Auto | Self::Y => Vec3::Y,
             Self::Z => Vec3::Z,
         }
     }
@@ -32,7 +34,7 @@ impl UpAxis {
     /// Toward who looks at the front, of unit length.
     pub(super) fn front(self) -> Vec3 {
         match self {
-            Self::Y => Vec3::Z,
+            Self::Auto | Self::Y => Vec3::Z,
             Self::Z => Vec3::NEG_Y,
         }
     }
@@ -116,7 +118,7 @@ pub struct Staging {
 impl Default for Staging {
     fn default() -> Self {
         Self {
-            up: UpAxis::Y,
+            up: UpAxis::Auto,
             azimuth: None,
             elevation: None,
             distance: None,
@@ -269,7 +271,7 @@ impl Staging {
                 let file = filename(path);
                 // Images of all around have y up.
                 let turn = match self.up {
-                    UpAxis::Y => "",
+                    UpAxis::Auto | UpAxis::Y => "",
                     UpAxis::Z => {
                         r#"<transform name="to_world"><rotate x="1" angle="90"/></transform>"#
                     }
