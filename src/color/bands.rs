@@ -65,7 +65,11 @@ impl<const N: usize> ColorModel for Bands<N> {
     type Columns<F: Lanes> = Columns<F, N>;
 
     fn run<T: Task>(kernel: Kernel, task: T) -> T::Output {
-        kernel.run_many(task)
+        // Sixteen lanes of more channels take longer to compile than they save.
+        match N <= 32 {
+            true => kernel.run_many(task),
+            false => kernel.run_single(task),
+        }
     }
 
     fn passes(&self) -> u32 {

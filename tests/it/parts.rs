@@ -85,7 +85,7 @@ fn crops_and_passes_of_any_kind_of_render_come_to_the_bits_of_one_run() {
     for (options, passes) in [
         ("", &["0:1", "1:2", "2:4", "4:"][..]),
         ("--bands 16 --spp 20", &["0:2", "2:3"]),
-        ("--bands 40 --spp 20", &["0:1", "1:3"]),
+        ("--bands 70 --spp 20", &["0:1", "1:3"]),
         (
             "--noise-threshold 0.02 --max-spp 200 --sampler independent",
             &["0:1", "1:2", "2:"],
