@@ -148,7 +148,7 @@ fn what_parts_wavelengths_loses_none() {
         format!(r#"<bsdf type="dielectric">{flint}</bsdf>"#),
         format!(r#"<bsdf type="thindielectric">{flint}</bsdf>"#),
     ] {
-        for (count, spp) in [(3, 256), (16, 256), (65, 512)] {
+        for (count, spp) in [(3, 256), (16, 256), (65, 1536)] {
             for (name, mean) in means(&in_bands(&ball(&bsdf, spp), count, None, 3)) {
                 mean.assert_is(1.0, 0.02, &format!("{bsdf} {name} of {count}"));
             }
