@@ -4,6 +4,8 @@ use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
+use super::GROUP;
+
 /// Names of a sample's channels: red, green and blue, other colours of the colour model, what the integrator adds, and
 /// opacity.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -69,8 +71,26 @@ impl Layout {
         self.colors..self.opacity()
     }
 
-    /// Whether a channel is light or a colour, of which each pass over the bands brings a part; of others each brings all.
-    pub(crate) fn adds_up(&self, channel: usize) -> bool {
+    /// Takes the values of a sample, a channel each, of a pass over the bands into its place in columns. Of light and colours
+    /// each pass brings a part, of other channels the first brings all.
+    pub(crate) fn take<'v>(
+        &self,
+        pass: u32,
+        values: impl Iterator<Item = &'v f32>,
+        sample: usize,
+        columns: &mut [[f32; GROUP]],
+    ) {
+        for (channel, (column, value)) in columns.iter_mut().zip(values).enumerate() {
+            if pass == 0 {
+                column[sample] = *value;
+            } else if self.adds_up(channel) {
+                column[sample] += *value;
+            }
+        }
+    }
+
+    /// Whether a channel is light or a colour.
+    fn adds_up(&self, channel: usize) -> bool {
         let is_color = |name: &str| [".R", ".G", ".B"].iter().any(|end| name.ends_with(end));
         channel < self.colors || is_color(&self.names[channel])
     }

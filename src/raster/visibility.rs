@@ -108,13 +108,11 @@ impl Visibility {
             limits: Limits::new(projection, grid.band()),
             code: DepthCode::new(projection, depth),
             projection,
+            window,
             grid,
         };
         let mut high = Vec::new();
         for placed in drawn.placed() {
-            if painter.misses(drawn, placed, &window) {
-                continue;
-            }
             high.append(&mut painter.paint(drawn, placed, cull));
         }
         let bands = (0..size[1].div_ceil(ROWS)).into_par_iter();
@@ -160,23 +158,20 @@ struct Painter<'a> {
     limits: Limits,
     code: DepthCode,
     projection: &'a Projection,
+    window: Window,
 }
 
 impl Painter<'_> {
-    /// Whether nothing of a shape is seen in the window.
-    fn misses(&self, drawn: &Drawn<'_>, placed: &Placed, window: &Window) -> bool {
-        let (linear, translation) = placed.matrix();
-        let (matrix, offset) = self.projection.along_ways(linear, translation);
-        let corners = drawn.facets(placed).bounds.corners();
-        let corners = corners.map(|corner| self.place(&matrix, offset, corner));
-        self.projection.misses(&corners, window)
-    }
-
     /// Draws a shape; the answer is the triangles that are left, which are high.
     fn paint(&self, drawn: &Drawn<'_>, placed: &Placed, cull: Cull) -> Vec<(Facet, u32)> {
         let facets = drawn.facets(placed);
         let (linear, translation) = placed.matrix();
         let (matrix, offset) = self.projection.along_ways(linear, translation);
+        let around = facets.bounds.corners();
+        let around = around.map(|corner| self.place(&matrix, offset, corner));
+        if self.projection.misses(&around, &self.window) {
+            return Vec::new();
+        }
         let corners: Vec<Corner> = (facets.positions.par_iter().with_min_len(GRAIN))
             .map(|position| self.corner(&matrix, offset, *position))
             .collect();

@@ -213,15 +213,9 @@ impl<C: ColorModel> Picture<'_, C> {
         let mut row = vec![0.0; self.layout.count()];
         for y in top..top + window.height {
             for x in 0..crop.width {
-                for pass in 0..self.shaders.len() {
-                    self.pixel([x, y], pass, &mut row);
-                    for (channel, (column, value)) in columns.iter_mut().zip(&row).enumerate() {
-                        if pass == 0 {
-                            column[0] = *value;
-                        } else if self.layout.adds_up(channel) {
-                            column[0] += *value;
-                        }
-                    }
+                for (pass, shader) in (0..).zip(&self.shaders) {
+                    self.pixel([x, y], (pass, shader), &mut row);
+                    self.layout.take(pass, row.iter(), 0, &mut columns);
                 }
                 let group = Group {
                     pixel: [crop.x + x, crop.y + y],
@@ -236,8 +230,7 @@ impl<C: ColorModel> Picture<'_, C> {
 
     /// The values of a pixel: each triangle in it is shaded where the first of its samples lies, or in the pixel's centre where
     /// all samples are its own.
-    fn pixel(&self, [x, y]: [u32; 2], pass: usize, row: &mut [f32]) {
-        let shader = &self.shaders[pass];
+    fn pixel(&self, [x, y]: [u32; 2], (pass, shader): (u32, &Shader<'_, C>), row: &mut [f32]) {
         let pixel = y as usize * self.film.crop.width as usize + x as usize;
         let pattern = &self.raster.pattern;
         let count = pattern.count();
@@ -267,7 +260,7 @@ impl<C: ColorModel> Picture<'_, C> {
             alpha += opaque * weight;
         }
         let color = self.scene.color();
-        color.develop(pass as u32, &sum, shader.wavelengths(), row);
+        color.develop(pass, &sum, shader.wavelengths(), row);
         if let Some(last) = row.last_mut() {
             *last = alpha;
         }

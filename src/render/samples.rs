@@ -137,13 +137,7 @@ impl<C: ColorModel> Batch<'_, C> {
                 }
                 let extra = &self.estimates.extra[index * extra..][..extra];
                 let values = self.row.iter().chain(extra).chain([alpha]);
-                for (channel, (column, value)) in columns.iter_mut().zip(values).enumerate() {
-                    if pass == 0 {
-                        column[sample] = *value;
-                    } else if layout.adds_up(channel) {
-                        column[sample] += *value;
-                    }
-                }
+                layout.take(pass, values, sample, columns);
                 index += 1;
             }
         }

@@ -53,16 +53,7 @@ impl Wrap {
     /// The texel that stands for the whole number `i` of `n`, wherever it lies.
     #[inline(always)]
     pub(super) fn apply<F: Lanes>(self, i: F, n: usize) -> F::Int {
-        let (size, last) = (F::splat(n as f32), (n - 1) as f32);
-        let wrapped = match self {
-            Self::Repeat => modulo(i, size),
-            Self::Clamp => i,
-            Self::Mirror => {
-                let i = modulo(i, size + size);
-                i.min(F::splat(2.0 * n as f32 - 1.0) - i)
-            }
-        };
-        wrapped.clamp(0.0, last).to_int()
+        self.apply_each(i, F::splat(n as f32))
     }
 
     /// The same of as many texels as each lane says.

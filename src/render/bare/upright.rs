@@ -6,6 +6,7 @@
 use std::path::Path;
 
 use glam::{DVec2, Vec3};
+use rayon::prelude::*;
 
 use super::{UpAxis, plugin};
 use crate::mesh::Mesh;
@@ -46,8 +47,8 @@ fn stands_on(mesh: &Mesh, up: UpAxis) -> f64 {
     // The axis is +y or +z.
     let (low, high) = (height(min), height(max));
     let touches = |p: &Vec3| height(*p) - low <= TOUCHING * (high - low);
-    let corners = mesh.triangles.iter().flat_map(|t| mesh.corners(t));
-    let touching = corners.filter(touches);
+    let triangles = mesh.triangles.par_iter().with_min_len(1 << 14);
+    let touching = triangles.flat_map_iter(|t| mesh.corners(t).into_iter().filter(touches));
     let mut points: Vec<DVec2> = touching
         .map(|p| DVec2::new((p - min).dot(right).into(), (p - min).dot(front).into()))
         .collect();

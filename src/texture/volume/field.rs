@@ -195,18 +195,9 @@ impl Placement {
 
     /// The box, in the unit cube's space, around a box in the world.
     pub(super) fn around(&self, world: &Bounds) -> Bounds {
-        let corner = |i: u32| {
-            let side = |axis: usize| {
-                if i >> axis & 1 == 1 {
-                    world.max
-                } else {
-                    world.min
-                }
-            };
-            let corner = Vec3::new(side(0).x, side(1).y, side(2).z);
-            self.to_local.transform_point3(corner)
-        };
-        (0..8).map(corner).fold(Bounds::EMPTY, Bounds::with)
+        let corners = world.corners().into_iter();
+        let own = corners.map(|corner| self.to_local.transform_point3(corner));
+        own.fold(Bounds::EMPTY, Bounds::with)
     }
 
     /// Places in the world as they stand in the unit cube.
