@@ -28,8 +28,9 @@ pub(super) struct StagingArguments {
     #[arg(long, value_name = "X,Y,Z", value_parser = parse::point, allow_hyphen_values = true, help_heading = BARE)]
     target: Option<DVec3>,
     /// What the mesh is made of: "clay" (matte), "metal" (rough) or "plastic" (glossy) in the mesh's own colours where it has
-    /// any, "glass" (clear), the one material of a scene file (.xml), or matte with an image as its base colour
-    #[arg(long, default_value = "clay", value_name = "NAME|FILE", value_parser = material, help_heading = BARE)]
+    /// any, "glass" (clear), the one material of a scene file (.xml), or matte with an image as its base colour; "auto" is
+    /// what the file's own materials say without their textures (glTF), or else clay
+    #[arg(long, default_value = "auto", value_name = "NAME|FILE", value_parser = material, help_heading = BARE)]
     material: Finish,
     /// What lights it: "studio", "sun", "sky", or an image of all around by longitude and latitude; "auto" is the file's own
     /// lights (glTF, in candela and lux: a radiance of 1 is 1 cd/m²) and nothing else, or else the studio
@@ -57,7 +58,7 @@ impl StagingArguments {
             (self.distance.is_some(), "--distance"),
             (self.fov.is_some(), "--fov"),
             (self.target.is_some(), "--target"),
-            (self.material != Finish::Clay, "--material"),
+            (self.material != Finish::Auto, "--material"),
             (self.light != Lighting::Auto, "--light"),
             (!matches!(self.background, Background::Sky), "--background"),
             (self.no_ground, "--no-ground"),
@@ -106,12 +107,13 @@ fn lighting(text: &str) -> Result<Lighting, String> {
 fn material(text: &str) -> Result<Finish, String> {
     let path = Path::new(text);
     match text {
+        "auto" => Ok(Finish::Auto),
         "clay" => Ok(Finish::Clay),
         "metal" => Ok(Finish::Metal),
         "glass" => Ok(Finish::Glass),
         "plastic" => Ok(Finish::Plastic),
         _ if !path.is_file() => Err(
-            "write clay, metal, glass, plastic, or the name of a scene file \
+            "write auto, clay, metal, glass, plastic, or the name of a scene file \
              or an image that is there"
                 .to_owned(),
         ),

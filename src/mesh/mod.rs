@@ -39,8 +39,8 @@ pub use generate::{
     menger, menger_triangles, rectangle, sphere, terrain,
 };
 pub use gltf::{
-    GltfCamera, GltfLight, GltfLightKind, GltfPart, GltfScene, GltfSetting, Projection,
-    gltf_is_animated, read_gltf, read_gltf_setting,
+    GltfCamera, GltfLight, GltfLightKind, GltfPart, GltfScene, GltfSetting, GltfSurface,
+    Projection, gltf_is_animated, read_gltf, read_gltf_setting,
 };
 pub use mtl::BARE_COLOR;
 pub use parts::{Part, Parts, read_parts};

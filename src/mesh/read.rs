@@ -28,7 +28,7 @@ pub struct ReadOptions {
     /// RGB, [`BARE_COLOR`](super::BARE_COLOR) where a face has none. Without any colour there is no attribute.
     pub materials: bool,
     /// Whether the file is all there is, and is read for what is in it, not as a scene's shape is in Mitsuba: with
-    /// the materials of an OBJ file and the colours of its vertices, colours in whole numbers divided by their range,
+    /// the materials of an OBJ or glTF file and the colours of its vertices, colours in whole numbers divided by their range,
     /// polygons covered as they are, concave or not, and coordinates that are far from the origin counted from a
     /// nearer one.
     pub bare: bool,

@@ -1,6 +1,7 @@
 //! `gltf`: the default scene of a glTF or GLB file `filename` as one mesh, with `to_world`, `face_normals`,
 //! `flip_normals` and `flip_tex_coords`; the materials' base colours are its attribute `face_color`, or where the file
-//! has colours of vertices `vertex_color`. Without normals it is flat. With `times` and no other file it deforms as the
+//! has colours of vertices `vertex_color`; with `bare` their other factors are `face_roughness`, `face_metallic`,
+//! `face_emission` and `face_opacity`. Without normals it is flat. With `times` and no other file it deforms as the
 //! file's first animation says: it is looked at at each of these times, in seconds. Étendue's own: Mitsuba has no such
 //! shape.
 

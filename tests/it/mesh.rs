@@ -6,7 +6,9 @@ use std::process::{Command, Output};
 
 use etendue::budget::Budget;
 use etendue::description;
-use etendue::render::{Lighting, Options, Overrides, Session, Silent, Staging, describe_mesh};
+use etendue::render::{
+    Finish, Lighting, Options, Overrides, Session, Silent, Staging, describe_mesh,
+};
 use serde_json::Value;
 
 /// Runs `etendue mesh` with the words of `arguments` in `folder`.
@@ -253,12 +255,8 @@ fn lights_of_a_gltf_file_give_what_candela_and_lux_say() {
         let options = description::Options::default();
         describe_mesh(&path, staging, &options, &Budget::default())
     };
-    let seen = |light: &str, turned: &str, lighting: Lighting| {
-        let staging = Staging {
-            lighting,
-            ..Staging::default()
-        };
-        let mut bare = describe(&lit_square(light, turned), &staging).unwrap();
+    let seen_of = |text: &str, staging: Staging| {
+        let mut bare = describe(text, &staging).unwrap();
         let overrides = Overrides {
             size: Some((4, 4)),
             spp: Some(16),
@@ -281,6 +279,14 @@ fn lights_of_a_gltf_file_give_what_candela_and_lux_say() {
             pixels.map(|pixel| f64::from(pixel[c])).sum::<f64>() / 16.0
         };
         ([0, 1, 2].map(mean), told)
+    };
+    let seen = |light: &str, turned: &str, lighting: Lighting| {
+        let staging = Staging {
+            lighting,
+            finish: Finish::Clay,
+            ..Staging::default()
+        };
+        seen_of(&lit_square(light, turned), staging)
     };
     // Radiance is illuminance · reflectance / π.
     let point = r#"{"type": "point", "intensity": 80, "color": [1, 0.5, 0]}"#;
@@ -319,6 +325,31 @@ fn lights_of_a_gltf_file_give_what_candela_and_lux_say() {
     let (staged, told) = seen(point, DOWN, Lighting::Sky);
     assert!(says(&told, "own lights (1) are left out"), "{told:?}");
     assert_eq!(staged, seen(sun, DOWN, Lighting::Sky).0);
+    // The file's own materials: metal or not, shining, see-through.
+    let own = |light: &str, material: &str| {
+        let staging = Staging {
+            ground: false,
+            ..Staging::default()
+        };
+        let text = lit_square(light, DOWN).replace("0.5, 0.5, 0.5, 1]}", material);
+        seen_of(&text, staging).0
+    };
+    let lambert = 6.0 * 0.5 / PI;
+    let [matte, ..] = own(sun, r#"0.5, 0.5, 0.5, 1], "metallicFactor": 0}"#);
+    assert!((matte / lambert - 1.0).abs() < 1e-3, "{matte}, {lambert}");
+    // A rough metal sends back D / 4 = 1 / 4π of its colour along the normal.
+    let [metal, ..] = own(sun, "0.5, 0.5, 0.5, 1]}");
+    assert!((metal / (0.25 * lambert) - 1.0).abs() < 0.01, "{metal}");
+    let [blended, ..] = own(
+        sun,
+        r#"0.5, 0.5, 0.5, 0.25], "metallicFactor": 0}, "alphaMode": "BLEND""#,
+    );
+    assert!((blended / matte - 0.25).abs() < 0.01, "{blended}, {matte}");
+    let dim = r#"{"type": "point", "intensity": 1e-9}"#;
+    let shining = own(dim, r#"0, 0, 0, 1]}, "emissiveFactor": [0.5, 0.25, 1]"#);
+    for (found, expected) in shining.into_iter().zip([0.5, 0.25, 1.0]) {
+        assert!((found - expected).abs() < 1e-3, "{shining:?}");
+    }
     for (wrong, message) in [
         (
             r#"{"type": "point", "intensity": -1}"#,

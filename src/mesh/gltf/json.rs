@@ -141,6 +141,7 @@ pub(super) struct Material {
     pub(super) emissive_texture: Option<IgnoredAny>,
     pub(super) emissive_factor: [f32; 3],
     pub(super) alpha_mode: Option<String>,
+    pub(super) alpha_cutoff: Option<f32>,
     pub(super) extensions: BTreeMap<String, Value>,
 }
 
@@ -150,6 +151,8 @@ pub(super) struct Pbr {
     /// Linear red, green, blue, and alpha.
     pub(super) base_color_factor: Option<[f32; 4]>,
     pub(super) base_color_texture: Option<TextureInfo>,
+    pub(super) metallic_factor: Option<f32>,
+    pub(super) roughness_factor: Option<f32>,
     pub(super) metallic_roughness_texture: Option<IgnoredAny>,
 }
 

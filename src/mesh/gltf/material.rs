@@ -1,4 +1,4 @@
-//! What of a glTF material is seen: its base colour. The rest is told once a file.
+//! What of a glTF material is seen: its factors, or its base colour alone. The rest is told once a file.
 
 use std::collections::BTreeSet;
 
@@ -6,9 +6,11 @@ use glam::{Mat2, Vec2};
 use serde_json::Value;
 
 use super::json::{Material, TextureInfo, TextureTransform};
+use super::{GltfSurface, Look};
 
 /// An archived extension, whose diffuse colour is the base colour.
 const SPECULAR_GLOSSINESS: &str = "KHR_materials_pbrSpecularGlossiness";
+const EMISSIVE_STRENGTH: &str = "KHR_materials_emissive_strength";
 
 impl Material {
     /// Linear red, green, blue, and alpha.
@@ -23,8 +25,53 @@ impl Material {
         own.or_else(diffuse).unwrap_or([1.0; 4])
     }
 
+    /// A number of one of its extensions.
+    fn extended(&self, extension: &str, name: &str) -> Option<f32> {
+        Some(self.extensions.get(extension)?[name].as_f64()? as f32)
+    }
+
+    /// What its factors say. Where a texture has most of the say the factor alone would be no likeness: then it is no
+    /// metal, and does not shine.
+    pub(super) fn surface(&self) -> GltfSurface {
+        let pbr = &self.pbr_metallic_roughness;
+        let (metallic, roughness) = if self.extensions.contains_key(SPECULAR_GLOSSINESS) {
+            let glossiness = self.extended(SPECULAR_GLOSSINESS, "glossinessFactor");
+            (0.0, 1.0 - glossiness.unwrap_or(1.0))
+        } else {
+            let metallic = match pbr.metallic_roughness_texture {
+                Some(_) => 0.0,
+                None => pbr.metallic_factor.unwrap_or(1.0),
+            };
+            (metallic, pbr.roughness_factor.unwrap_or(1.0))
+        };
+        let strength = self.extended(EMISSIVE_STRENGTH, "emissiveStrength");
+        let strength = match self.emissive_texture {
+            Some(_) => 0.0,
+            None => strength.unwrap_or(1.0),
+        };
+        let [.., alpha] = self.base_color();
+        let opacity = match self.alpha_mode.as_deref() {
+            Some("BLEND") => alpha,
+            Some("MASK") if alpha < self.alpha_cutoff.unwrap_or(0.5) => 0.0,
+            _ => 1.0,
+        };
+        let opacity = opacity.clamp(0.0, 1.0);
+        GltfSurface {
+            roughness: roughness.clamp(0.0, 1.0),
+            metallic: metallic.clamp(0.0, 1.0),
+            emission: (self.emissive_factor)
+                .map(|part| (part * strength * opacity).clamp(0.0, f32::MAX)),
+            opacity,
+        }
+    }
+
+    /// Whether its base colour is more than what a texture is multiplied by.
+    pub(super) fn has_color(&self) -> bool {
+        self.pbr_metallic_roughness.base_color_texture.is_none()
+    }
+
     /// Notes what is not shown of it.
-    pub(super) fn note_unseen(&self, unseen: &mut BTreeSet<String>) {
+    pub(super) fn note_unseen(&self, look: Look, unseen: &mut BTreeSet<String>) {
         let pbr = &self.pbr_metallic_roughness;
         let glossy = self.extensions.get(SPECULAR_GLOSSINESS);
         let textured = pbr.base_color_texture.is_some()
@@ -34,16 +81,22 @@ impl Material {
             || self.emissive_texture.is_some()
             || glossy.is_some_and(|g| g.get("diffuseTexture").is_some());
         let opaque = matches!(self.alpha_mode.as_deref(), None | Some("OPAQUE"));
+        let color_alone = look == Look::Color;
         for (there, what) in [
             (textured, "textures"),
-            (self.emissive_factor != [0.0; 3], "emission"),
-            (!opaque, "transparency"),
+            (color_alone && self.emissive_factor != [0.0; 3], "emission"),
+            (
+                !opaque && (color_alone || !self.has_color()),
+                "transparency",
+            ),
         ] {
             if there {
                 unseen.insert(what.to_owned());
             }
         }
-        unseen.extend(self.extensions.keys().cloned());
+        let names = self.extensions.keys();
+        let names = names.filter(|name| color_alone || *name != EMISSIVE_STRENGTH);
+        unseen.extend(names.cloned());
     }
 }
 

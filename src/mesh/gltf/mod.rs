@@ -1,6 +1,7 @@
 //! glTF 2.0, as JSON or GLB: the meshes of the default scene in world space with their colours, and its setting: the first camera and the lights.
 //! Morph targets stand at their default weights, skins at their nodes' places, or both as the first animation has them at
-//! a time that is asked for. Pictures are left out, lights where they are not asked for, and animations where no time is, with a warning for each kind. Texture coordinates are those of the base colour, with their origin at the
+//! a time that is asked for. Of materials their factors are read, or their base colours alone. Both sides of a triangle are
+//! there, whatever `doubleSided` says. Pictures are left out, lights where they are not asked for, and animations where no time is, with a warning for each kind. Texture coordinates are those of the base colour, with their origin at the
 //! top left, as Mitsuba's bitmaps have it, and stay as they are. A primitive without normals is flat, says the
 //! specification: its mesh has none. Under a mirroring transform the winding turns, so that the outside stays outside.
 
@@ -29,7 +30,7 @@ use crate::budget::{Account, Budget};
 use crate::error::{Error, Location, Problem, Result};
 use accessor::Accessors;
 use container::{Buffers, Container};
-use json::{Primitive, Root, at};
+use json::{Material, Primitive, Root, at};
 use material::Coordinates;
 use places::Places;
 use primitive::{Mode, Recipe, Size};
@@ -56,14 +57,41 @@ pub struct GltfPart {
     pub mesh: Mesh,
     /// Linear red, green, blue, and alpha, in [0, 1]: the material's base colour factor.
     pub base_color: [f32; 4],
+    /// The rest of the material.
+    pub surface: GltfSurface,
     /// The node's name, or its mesh's; empty where neither has one.
     pub name: String,
+}
+
+/// A material beside its base colour, by its factors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GltfSurface {
+    /// From a mirror to matte, in [0, 1].
+    pub roughness: f32,
+    /// From a dielectric to a metal, in [0, 1].
+    pub metallic: f32,
+    /// Linear red, green and blue, in cd/m², as far as it is opaque. Not negative.
+    pub emission: [f32; 3],
+    /// In [0, 1].
+    pub opacity: f32,
+}
+
+impl Default for GltfSurface {
+    /// That of a primitive without a material.
+    fn default() -> Self {
+        Self {
+            roughness: 1.0,
+            metallic: 1.0,
+            emission: [0.0; 3],
+            opacity: 1.0,
+        }
+    }
 }
 
 /// A camera: it looks along −Z of its own frame, with +Y up and +X to the right.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GltfCamera {
-    /// From the camera's frame to the world.
+    /// From the camera's frame to the world, without the scaling of its node.
     pub to_world: DMat4,
     /// What it sees.
     pub projection: Projection,
@@ -143,7 +171,7 @@ const MOST: usize = 1 << 28;
 /// # Errors
 /// Where the file or a buffer that it names cannot be read or is malformed.
 pub fn read_gltf(path: &Path, options: &ReadOptions, account: &Account) -> Result<GltfScene> {
-    let walk = with_input(path, account, |input| walk(input, options))?;
+    let walk = with_input(path, account, |input| walk(input, options, Look::Color))?;
     let mut scene = GltfScene {
         camera: walk.camera,
         ..GltfScene::default()
@@ -213,9 +241,14 @@ pub fn gltf_is_animated(path: &Path, budget: &Budget) -> Result<bool> {
     animated().map_err(|why| Error::input(why).at(&Location::of_file(path)))
 }
 
-/// All parts as one mesh, with their colours.
+/// All parts as one mesh, with their colours, and with the rest of their materials where the file is all there is.
 pub(super) fn read(input: Input<'_>, options: &ReadOptions) -> Result<Decoded> {
-    let walk = walk(input, options)?;
+    let look = if options.bare {
+        Look::Factors
+    } else {
+        Look::Color
+    };
+    let walk = walk(input, options, look)?;
     let mut mesh = Mesh::default();
     for part in walk.parts {
         mesh.append(part.mesh);
@@ -228,9 +261,20 @@ pub(super) fn read(input: Input<'_>, options: &ReadOptions) -> Result<Decoded> {
     })
 }
 
+/// What is taken from materials.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+enum Look {
+    /// Their base colours.
+    #[default]
+    Color,
+    /// All of their factors.
+    Factors,
+}
+
 /// What is left out of a file: told once for each kind.
 #[derive(Default)]
 struct Notes {
+    look: Look,
     counts: BTreeMap<&'static str, usize>,
     /// Names of vertex data.
     unread: BTreeSet<String>,
@@ -254,8 +298,12 @@ impl Notes {
             told.push(format!("vertex data left out: {names}"));
         }
         if let Some(names) = listed(&self.unseen) {
+            let what = match self.look {
+                Look::Color => "base colour factor",
+                Look::Factors => "factors",
+            };
             told.push(format!(
-                "materials are shown by their base colour factor alone, without {names}"
+                "materials are shown by their {what} alone, without {names}"
             ));
         }
         told
@@ -283,9 +331,13 @@ struct Walk {
     files: Vec<PathBuf>,
     /// Vertices and corners so far.
     size: usize,
+    /// Whether a part has a material.
+    made: bool,
+    /// Whether one has a base colour that is not a texture's.
+    painted: bool,
 }
 
-fn walk(input: Input<'_>, options: &ReadOptions) -> Result<Walk> {
+fn walk(input: Input<'_>, options: &ReadOptions, look: Look) -> Result<Walk> {
     let (path, account) = (input.path, input.account);
     let bytes = input.bytes()?;
     let walked = || -> OrWhy<Walk> {
@@ -293,6 +345,7 @@ fn walk(input: Input<'_>, options: &ReadOptions) -> Result<Walk> {
         take_tree(container.json, account)?;
         let mut root = Root::parse(container.json)?;
         let mut walk = Walk::default();
+        walk.notes.look = look;
         let buffers = Buffers::load(&root, container.binary, path, account);
         if let Some(time) = options.time {
             let accessors = Accessors {
@@ -322,6 +375,9 @@ fn walk(input: Input<'_>, options: &ReadOptions) -> Result<Walk> {
             walk.node(placed, &stage, &accessors)?;
         }
         walk.color();
+        if look == Look::Factors && walk.made {
+            walk.parts.iter_mut().for_each(GltfPart::describe_surface);
+        }
         walk.files = buffers.files;
         if options.flip_tex_coords.unwrap_or(false) {
             for part in &mut walk.parts {
@@ -396,7 +452,9 @@ impl Walk {
             (self.notes).add("corners after a primitive's last whole triangle are left out");
         }
         if let Some(material) = material {
-            material.note_unseen(&mut self.notes.unseen);
+            material.note_unseen(self.notes.look, &mut self.notes.unseen);
+            self.made = true;
+            self.painted |= material.has_color();
         }
         let unread = recipe.unread().map(str::to_owned);
         self.notes.unread.extend(unread);
@@ -409,7 +467,7 @@ impl Walk {
         }
         // With what is put together on the way, and the mesh that all parts are appended to.
         const VERTEX: usize = 100;
-        const CORNER: usize = 20;
+        const CORNER: usize = 36;
         let bytes = vertices
             .saturating_mul(VERTEX)
             .saturating_add(corners.saturating_mul(CORNER));
@@ -430,15 +488,17 @@ impl Walk {
         Ok(Some(GltfPart {
             mesh,
             base_color,
+            surface: material.map_or_else(GltfSurface::default, Material::surface),
             name: String::new(),
         }))
     }
 
     /// Gives the parts their colours, all in one way so that they can be put together: those of vertices where any
-    /// part has them, else those of materials where any is not white.
+    /// part has them, else those of materials where any is not white, or is white and all of its look.
     fn color(&mut self) {
         let by_vertex = self.parts.iter().any(|p| !p.mesh.attributes.is_empty());
-        let colored = self.parts.iter().any(|p| p.base_color != [1.0; 4]);
+        let colored = self.parts.iter().any(|p| p.base_color != [1.0; 4])
+            || self.notes.look == Look::Factors && self.painted;
         if !by_vertex && !colored {
             return;
         }
@@ -460,6 +520,32 @@ impl Walk {
                 values: base_color[..3].repeat(count),
             });
         }
+    }
+}
+
+impl GltfPart {
+    /// Makes attributes of its material, the same ones of every part.
+    fn describe_surface(&mut self) {
+        let GltfSurface {
+            roughness,
+            metallic,
+            emission,
+            opacity,
+        } = self.surface;
+        let count = self.mesh.triangles.len();
+        let attributes = [
+            ("face_roughness", &[roughness][..]),
+            ("face_metallic", &[metallic]),
+            ("face_emission", &emission),
+            ("face_opacity", &[opacity]),
+        ];
+        let attributes = attributes.map(|(name, row)| Attribute {
+            name: name.to_owned(),
+            channels: row.len(),
+            per: Per::Face,
+            values: row.repeat(count),
+        });
+        self.mesh.attributes.extend(attributes);
     }
 }
 

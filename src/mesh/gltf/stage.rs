@@ -1,6 +1,6 @@
 //! The nodes of a glTF scene, with their places in the world, its first camera and its lights.
 
-use glam::{DMat4, DQuat, DVec3};
+use glam::{DMat3, DMat4, DQuat, DVec3};
 
 use super::json::{Camera, Node, Root, Scene, at};
 use super::{GltfCamera, Notes, OrWhy, Projection};
@@ -81,11 +81,10 @@ impl<'r> Stage<'r> {
         let camera = at(&root.cameras, camera, "camera")?.placed(to_world);
         match camera {
             Some(_) if self.camera.is_some() => notes.add("cameras after the first are left out"),
-            Some(GltfCamera {
-                projection: Projection::Orthographic { .. },
-                ..
-            }) => notes.add("an orthographic camera is not looked through"),
-            _ => {}
+            None => {
+                notes.add("a camera without numbers, or of a node without an extent, is left out")
+            }
+            Some(_) => {}
         }
         self.camera = self.camera.or(camera);
         Ok(())
@@ -134,8 +133,20 @@ pub(super) fn placement(
     )
 }
 
+/// A camera's place without scaling, says the specification, and so without a mirror or slanting axes too.
+fn unscaled(to_world: &DMat4) -> Option<DMat4> {
+    let [_, up, back] =
+        [to_world.x_axis, to_world.y_axis, to_world.z_axis].map(|axis| axis.truncate());
+    let back = back.try_normalize()?;
+    let up = (up.try_normalize()?).reject_from_normalized(back);
+    let up = up.try_normalize()?;
+    let axes = DMat3::from_cols(up.cross(back), up, back);
+    let origin = to_world.w_axis.truncate();
+    Some(DMat4::from_mat3_translation(axes, origin))
+}
+
 impl Camera {
-    /// `None` where the file leaves out the numbers.
+    /// `None` where the file leaves out the numbers, or the node has no extent.
     fn placed(&self, to_world: &DMat4) -> Option<GltfCamera> {
         let (projection, near, far) = if let Some(p) = &self.perspective {
             let projection = Projection::Perspective {
@@ -152,7 +163,7 @@ impl Camera {
             (projection, o.znear, Some(o.zfar))
         };
         Some(GltfCamera {
-            to_world: *to_world,
+            to_world: unscaled(to_world)?,
             projection,
             near,
             far,

@@ -575,7 +575,6 @@ fn each_kind_of_thing_that_is_left_out_is_told_once() {
         {"camera": 0, "extensions": {"KHR_lights_punctual": {"light": 0}}},
         {"camera": 0, "extensions": {"KHR_lights_punctual": {"light": 0}}}]);
     let expected = [
-        "an orthographic camera is not looked through",
         "animations are left out: nodes and weights stand at rest",
         "cameras after the first are left out",
         "lights are left out (KHR_lights_punctual) (2 times)",
@@ -585,6 +584,66 @@ fn each_kind_of_thing_that_is_left_out_is_told_once() {
     assert_eq!(
         document.warnings(),
         expected.map(|said| format!("test.gltf: {said}"))
+    );
+}
+
+#[test]
+fn the_factors_of_materials_are_attributes_where_the_file_is_all_there_is() {
+    let mut document = Document::rectangle();
+    let mut primitives = Vec::new();
+    for material in 0..5 {
+        let mut primitive = document.primitive().clone();
+        primitive["material"] = material.into();
+        primitives.push(primitive);
+    }
+    primitives.push(document.primitive().clone());
+    document.json["meshes"][0]["primitives"] = primitives.into();
+    document.json["materials"] = json!([
+        {"pbrMetallicRoughness": {"metallicFactor": 0.25, "roughnessFactor": 0.5}, "emissiveFactor": [1, 0.5, 0],
+            "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 4}}},
+        {"pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0.25]}, "emissiveFactor": [1, 1, 1], "alphaMode": "BLEND"},
+        {"pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0.25], "metallicRoughnessTexture": {"index": 0}},
+            "emissiveFactor": [1, 1, 1], "emissiveTexture": {"index": 0}, "alphaMode": "MASK", "alphaCutoff": 0.2},
+        {"pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0.25]}, "alphaMode": "MASK"},
+        {"extensions": {"KHR_materials_pbrSpecularGlossiness": {"glossinessFactor": 0.75}}}]);
+    let loaded = decode("test.gltf", &document.text(), &ReadOptions::BARE).unwrap();
+    let values = |name: &str| {
+        let named = loaded.mesh.attributes.iter().find(|a| a.name == name);
+        let attribute = named.unwrap();
+        // Of two triangles a primitive.
+        (0..6)
+            .map(|i| attribute.row(2 * i).to_vec())
+            .collect::<Vec<_>>()
+    };
+    let numbers = |name: &str| values(name).concat();
+    assert_eq!(numbers("face_roughness"), [0.5, 1.0, 1.0, 1.0, 0.25, 1.0]);
+    assert_eq!(numbers("face_metallic"), [0.25, 1.0, 0.0, 1.0, 0.0, 1.0]);
+    assert_eq!(numbers("face_opacity"), [1.0, 0.25, 1.0, 0.0, 1.0, 1.0]);
+    let emission = values("face_emission");
+    assert_eq!(emission[..3], [[4.0, 2.0, 0.0], [0.25; 3], [0.0; 3]]);
+    // White, and not without a colour.
+    assert_eq!(values("face_color"), [[1.0; 3]; 6]);
+    let [told] = &loaded.warnings[..] else {
+        panic!("{:?}", loaded.warnings);
+    };
+    let expected = "materials are shown by their factors alone, without KHR_materials_pbrSpecularGlossiness, textures";
+    assert!(told.to_string().contains(expected), "{told}");
+    let as_shape = document.mesh().attributes;
+    assert!(as_shape.len() == 1 && as_shape[0].name == "face_color");
+    // What is a texture's has no colour of its own.
+    document.json["materials"] =
+        json!([{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}]);
+    document.json["meshes"][0]["primitives"]
+        .as_array_mut()
+        .unwrap()
+        .truncate(1);
+    let loaded = decode("test.gltf", &document.text(), &ReadOptions::BARE).unwrap();
+    assert!(
+        loaded
+            .mesh
+            .attributes
+            .iter()
+            .all(|a| a.name != "face_color")
     );
 }
 

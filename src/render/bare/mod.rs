@@ -1,10 +1,12 @@
 //! A bare mesh as a scene: framed by its own camera (glTF) or an automatic one, on a ground, under a soft sky
-//! and a key light or the file's own lights (glTF), in the colours of its vertices, faces or materials where the file has any. The ground is a little
+//! and a key light or the file's own lights (glTF), in the colours of its vertices, faces or materials where the file has any,
+//! or of its materials (glTF). The ground is a little
 //! lower than the mesh, so that what is flat does not lie in it.
 
 mod frame;
 mod lights;
 mod staging;
+mod surface;
 mod upright;
 
 use std::path::Path;
@@ -130,12 +132,15 @@ pub fn describe_mesh(
     let subject = Subject {
         plugin,
         bounds,
-        camera: camera.and_then(|camera| own_camera(&camera)),
+        camera: camera.and_then(|camera| own_camera(&camera, staging.aspect)),
         lights: &lights,
         mesh: &loaded.mesh,
         staging,
     };
-    let material = staging.material(|name| color(&loaded.mesh, name));
+    let material = match surface::material(&loaded.mesh, staging) {
+        Some(own) => own,
+        None => staging.material(|name| color(&loaded.mesh, name)),
+    };
     let name = Path::new(path.file_name().unwrap_or_default());
     let text = scene(&subject, name, true, &material);
     let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
@@ -146,7 +151,7 @@ pub fn describe_mesh(
             .mesh
             .attributes
             .iter()
-            .any(|a| a.name == "face_color");
+            .any(|a| a.name.starts_with("face_"));
     let material = match &own {
         Some((file, bsdf)) => file.written(*bsdf),
         None => material,
@@ -190,23 +195,36 @@ struct Subject<'a> {
 struct OwnCamera {
     /// From Mitsuba's camera space.
     to_world: DMat4,
-    /// In degrees.
-    fov_y: f64,
+    /// The vertical angle of view, in degrees; `None`: its rays are parallel.
+    fov_y: Option<f64>,
+    near: f64,
+    /// `None`: infinite.
+    far: Option<f64>,
 }
 
-/// A perspective camera as a scene file says it; `None` for others.
-fn own_camera(camera: &GltfCamera) -> Option<OwnCamera> {
+/// A camera as a scene file says it, of a film of this width over its height; `None` where it sees nothing.
+fn own_camera(camera: &GltfCamera, aspect: f32) -> Option<OwnCamera> {
     // Mitsuba's camera looks along +z with +x to the left: half a turn around y.
     let to_world = camera.to_world * DMat4::from_scale(DVec3::new(-1.0, 1.0, -1.0));
-    match camera.projection {
+    let GltfCamera { near, far, .. } = *camera;
+    let (to_world, fov_y) = match camera.projection {
         Projection::Perspective { fov_y, .. } if fov_y > 0.0 && fov_y < std::f64::consts::PI => {
-            Some(OwnCamera {
-                to_world,
-                fov_y: fov_y.to_degrees(),
-            })
+            (to_world, Some(fov_y.to_degrees()))
         }
-        _ => None,
-    }
+        // The film's width is 2 in the units of `to_world`.
+        Projection::Orthographic { half_height, .. } if half_height > 0.0 => {
+            let half_width = half_height * f64::from(aspect);
+            let scale = DVec3::new(half_width, half_width, 1.0);
+            (to_world * DMat4::from_scale(scale), None)
+        }
+        _ => return None,
+    };
+    Some(OwnCamera {
+        to_world,
+        fov_y,
+        near,
+        far,
+    })
 }
 
 /// Whether a triangle can be seen from somewhere.
@@ -240,10 +258,7 @@ fn unseen(mesh: &Mesh) -> Vec<String> {
 
 /// The mesh's own colours as a texture of this name.
 fn color(mesh: &Mesh, name: &str) -> Option<String> {
-    let attribute = &colors(mesh).next()?.name;
-    Some(format!(
-        r#"<texture name="{name}" type="mesh_attribute"><string name="name" value="{attribute}"/></texture>"#
-    ))
+    Some(surface::texture(name, &colors(mesh).next()?.name))
 }
 
 /// The scene around the mesh that the shape reads from `file`, `bare` with its materials' colours, and that is made of
@@ -260,18 +275,35 @@ fn scene(subject: &Subject<'_>, file: &Path, bare: bool, material: &str) -> Stri
     let up = staging.up.direction();
     let pose = frame::pose(mesh, (min, max), staging);
     let distance = pose.eye.distance(pose.target);
-    let [near, far] = [distance * 1e-3, (distance + f64::from(radius)) * 100.0];
-    let (fov, fov_axis, to_world) = match &subject.camera {
-        Some(OwnCamera { to_world, fov_y }) => {
-            let rows = to_world.transpose().to_cols_array().map(|v| v.to_string());
-            let matrix = format!(r#"<matrix value="{}"/>"#, rows.join(" "));
-            (*fov_y, "y", matrix)
+    let [mut near, mut far] = [distance * 1e-3, (distance + f64::from(radius)) * 100.0];
+    let field = |fov: f64, axis: &str| {
+        format!(
+            r#"
+        <float name="fov" value="{fov}"/>
+        <string name="fov_axis" value="{axis}"/>"#
+        )
+    };
+    let (sensor, field, to_world) = match &subject.camera {
+        Some(camera) => {
+            // It sees nothing nearer than where it stands.
+            near = camera.near.max(1e-6 * distance);
+            far = camera.far.unwrap_or(far.max(1e6 * near));
+            let rows = camera.to_world.transpose().to_cols_array();
+            let matrix = format!(
+                r#"<matrix value="{}"/>"#,
+                rows.map(|v| v.to_string()).join(" ")
+            );
+            match camera.fov_y {
+                Some(fov) => ("perspective", field(fov, "y"), matrix),
+                None => ("orthographic", String::new(), matrix),
+            }
         }
         None => {
             let [eye, target, upright] =
                 [pose.eye, pose.target, pose.up].map(|p| format!("{}, {}, {}", p.x, p.y, p.z));
             let lookat = format!(r#"<lookat origin="{eye}" target="{target}" up="{upright}"/>"#);
-            (staging.fov.unwrap_or(FOV).into(), "smaller", lookat)
+            let fov = staging.fov.unwrap_or(FOV).into();
+            ("perspective", field(fov, "smaller"), lookat)
         }
     };
     let hidden = match staging.background {
@@ -285,10 +317,8 @@ fn scene(subject: &Subject<'_>, file: &Path, bare: bool, material: &str) -> Stri
     let key = (-0.9 * pose.right + 0.7 * pose.front + 1.2 * up).normalize();
     format!(
         r#"<scene version="3.0.0">
-    <integrator type="path"><integer name="max_depth" value="8"/>{hidden}</integrator>
-    <sensor type="perspective">
-        <float name="fov" value="{fov}"/>
-        <string name="fov_axis" value="{fov_axis}"/>
+    <integrator type="{integrator}"><integer name="max_depth" value="8"/>{hidden}</integrator>
+    <sensor type="{sensor}">{field}
         <float name="near_clip" value="{near}"/>
         <float name="far_clip" value="{far}"/>
         <transform name="to_world">{to_world}</transform>
@@ -299,7 +329,7 @@ fn scene(subject: &Subject<'_>, file: &Path, bare: bool, material: &str) -> Stri
     <shape type="{plugin}">
         <string name="filename" value="{file}"/>
         <boolean name="face_normals" value="{flat}"/>{bare}
-        {material}
+        {material}{emission}
     </shape>
 </scene>"#,
         lights = staging.lights(center, radius, key, subject.lights),
@@ -316,6 +346,8 @@ fn scene(subject: &Subject<'_>, file: &Path, bare: bool, material: &str) -> Stri
             "stl" => upright::is_angular(mesh),
             _ => false,
         },
+        integrator = surface::integrator(mesh, staging),
+        emission = surface::emission(mesh, staging),
         bare = if bare {
             "\n        <boolean name=\"bare\" value=\"true\"/>"
         } else {
@@ -394,6 +426,38 @@ mod tests {
     }
 
     #[test]
+    fn a_gltf_cameras_clips_and_parallel_rays_are_kept_and_the_scaling_of_its_node_is_not() {
+        let sensor = |camera: &str| {
+            let text = GLTF
+                .replace(
+                    "\"translation\":[0,0,4]",
+                    "\"translation\":[0,0,4],\"scale\":[-3,2,5]",
+                )
+                .replace(
+                    r#""perspective","perspective":{"yfov":0.5,"znear":0.1}"#,
+                    camera,
+                );
+            let scene = describe("camera.gltf", &text);
+            let sensor = scene.root().children(Kind::Sensor)[0];
+            let [near, far] = ["near_clip", "far_clip"].map(|name| sensor.float(name).unwrap());
+            let to_world = sensor.transform("to_world").unwrap();
+            (sensor.plugin().to_owned(), to_world, near, far)
+        };
+        let turned = DVec3::new(-1.0, 1.0, -1.0);
+        let from = DMat4::from_translation(DVec3::new(0.0, 0.0, 4.0));
+        let (plugin, to_world, near, far) =
+            sensor(r#""perspective","perspective":{"yfov":0.5,"znear":3.5,"zfar":4.5}"#);
+        assert_eq!((plugin.as_str(), near, far), ("perspective", 3.5, 4.5));
+        assert!(to_world.abs_diff_eq(from * DMat4::from_scale(turned), 1e-9));
+        let (plugin, to_world, near, far) =
+            sensor(r#""orthographic","orthographic":{"xmag":7,"ymag":1.5,"znear":0,"zfar":9}"#);
+        assert!(plugin == "orthographic" && near > 0.0 && near < 1e-4 && far == 9.0);
+        // The film is 4:3.
+        let scale = DMat4::from_scale(turned * DVec3::new(2.0, 2.0, 1.0));
+        assert!(to_world.abs_diff_eq(from * scale, 1e-6), "{to_world}");
+    }
+
+    #[test]
     fn a_mesh_with_vertex_colours_shows_them() {
         let mesh = |scene: &Description| {
             let shape = scene.root().children(Kind::Shape)[2];
@@ -405,6 +469,39 @@ mod tests {
         assert!(mesh(&describe("colored.gltf", GLTF)));
         let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
         assert!(!mesh(&describe("plain.obj", obj)));
+    }
+
+    #[test]
+    fn a_gltf_file_shows_the_factors_of_its_materials() {
+        let parts = |factors: &str, material: &str| {
+            let text = GLTF.replace("1]}}", &format!("1]{factors}}}{material}}}"));
+            let scene = describe("made.gltf", &text);
+            let integrator = scene.root().children(Kind::Integrator)[0];
+            let shape = scene.root().children(Kind::Shape)[2];
+            let mut named = vec![integrator.plugin().to_owned()];
+            let mut bsdf = shape.children(Kind::Bsdf)[0];
+            while let [inner] = bsdf.children(Kind::Bsdf)[..] {
+                named.push(bsdf.plugin().to_owned());
+                bsdf = inner;
+            }
+            named.push(bsdf.plugin().to_owned());
+            let emitters = shape.children(Kind::Emitter).len();
+            (
+                named.join(" "),
+                bsdf.children(Kind::Texture).len(),
+                emitters,
+            )
+        };
+        let of = |named: &str, textures, emitters| (named.to_owned(), textures, emitters);
+        assert_eq!(parts("", ""), of("path twosided principled", 3, 0));
+        let matte = r#","metallicFactor":0"#;
+        assert_eq!(parts(matte, ""), of("path twosided diffuse", 1, 0));
+        let cut = r#","alphaMode":"MASK","alphaCutoff":2,"emissiveFactor":[1,1,1]"#;
+        // Nothing of it is left to shine.
+        let expected = of("volpath mask twosided diffuse", 1, 0);
+        assert_eq!(parts(matte, cut), expected);
+        let shining = r#","emissiveFactor":[0,0,1]"#;
+        assert_eq!(parts(matte, shining), of("path twosided diffuse", 1, 1));
     }
 
     #[test]

@@ -43,8 +43,10 @@ impl UpAxis {
 /// What a bare mesh is made of.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Finish {
-    /// Matte, in its own colours or those of clay.
+    /// By the factors of its own materials (glTF), or else clay.
     #[default]
+    Auto,
+    /// Matte, in its own colours or those of clay.
     Clay,
     /// Rough metal in its own colours, or aluminium.
     Metal,
@@ -126,7 +128,7 @@ impl Default for Staging {
             target: None,
             aspect: 4.0 / 3.0,
             all_around: false,
-            finish: Finish::Clay,
+            finish: Finish::Auto,
             lighting: Lighting::Auto,
             background: Background::Sky,
             ground: true,
@@ -194,7 +196,7 @@ impl Staging {
         };
         let twosided = |inside: String| format!(r#"<bsdf type="twosided">{inside}</bsdf>"#);
         match &self.finish {
-            Finish::Clay => {
+            Finish::Auto | Finish::Clay => {
                 let reflectance = clay("reflectance");
                 twosided(format!(r#"<bsdf type="diffuse">{reflectance}</bsdf>"#))
             }
