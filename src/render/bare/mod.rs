@@ -99,8 +99,18 @@ pub fn describe_mesh(
         );
         return Err(Error::input(message).at(&Location::of_file(path)));
     }
+    let (rule, up) = (staging.up.rule(path), staging.up.of(path, &loaded.mesh));
+    if up != rule {
+        let [up, rule] = [up, rule].map(|axis| if axis == UpAxis::Z { 'z' } else { 'y' });
+        let message = format!(
+            "with +{rule} up, as its format has it, it would lie on its side: it is shown with +{up} up"
+        );
+        let turned = Error::input(message).help(format!("`--up {rule}` leaves it as it is"));
+        let turned = turned.at(&Location::of_file(path));
+        loaded.warnings.extend_from_slice(turned.problems());
+    }
     let staging = &Staging {
-        up: staging.up.of(path, &loaded.mesh),
+        up,
         ..staging.clone()
     };
     let own = staging.own_material(options, budget)?;

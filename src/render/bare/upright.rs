@@ -20,14 +20,22 @@ const DOUBTLESS: f64 = 4.0;
 const EDGE: f32 = 0.866;
 
 impl UpAxis {
+    /// The axis of meshes in files of that format, as a rule.
+    pub(super) fn rule(self, path: &Path) -> Self {
+        match (self, plugin(path)) {
+            (Self::Auto, Some("stl")) => Self::Z,
+            (Self::Auto, _) => Self::Y,
+            (given, _) => given,
+        }
+    }
+
     /// The axis of the mesh of a file.
     pub(crate) fn of(self, path: &Path, mesh: &Mesh) -> Self {
-        let (rule, other) = match (self, plugin(path)) {
-            (Self::Auto, Some("gltf")) => return Self::Y,
-            (Self::Auto, Some("stl")) => (Self::Z, Self::Y),
-            (Self::Auto, _) => (Self::Y, Self::Z),
-            (given, _) => return given,
-        };
+        let rule = self.rule(path);
+        if self != Self::Auto || plugin(path) == Some("gltf") {
+            return rule;
+        }
+        let other = if rule == Self::Z { Self::Y } else { Self::Z };
         let [by_rule, by_other] = [rule, other].map(|up| stands_on(mesh, up));
         match by_other >= STANDING && by_other >= DOUBTLESS * by_rule {
             true => other,
@@ -46,26 +54,33 @@ fn stands_on(mesh: &Mesh, up: UpAxis) -> f64 {
     let height = |p: Vec3| p.dot(up);
     // The axis is +y or +z.
     let (low, high) = (height(min), height(max));
-    let touches = |p: &Vec3| height(*p) - low <= TOUCHING * (high - low);
-    let triangles = mesh.triangles.par_iter().with_min_len(1 << 14);
-    let touching = triangles.flat_map_iter(|t| mesh.corners(t).into_iter().filter(touches));
-    let mut points: Vec<DVec2> = touching
-        .map(|p| DVec2::new((p - min).dot(right).into(), (p - min).dot(front).into()))
-        .collect();
+    // Vertices that no triangle has may lie beyond the box.
+    let inside = |p: Vec3| p.cmpge(min).all() && p.cmple(max).all();
+    let touches = |p: &Vec3| height(*p) - low <= TOUCHING * (high - low) && inside(*p);
+    let below = |p: &Vec3| DVec2::new((p - min).dot(right).into(), (p - min).dot(front).into());
+    // The hull of all is that of the parts' hulls.
+    let parts = mesh
+        .positions
+        .par_chunks(1 << 14)
+        .flat_map_iter(|part| hull(part.iter().filter(|p| touches(p)).map(below).collect()));
+    let standing = hull(parts.collect());
     let size = max - min;
-    let below = f64::from(size.dot(right).abs()) * f64::from(size.dot(front).abs());
+    let reach = f64::from(size.dot(right).abs()) * f64::from(size.dot(front).abs());
     // What is flat lies rather than stands: that says nothing.
-    if below > 0.0 && high > low {
-        hull_area(&mut points) / below
+    if reach > 0.0 && high > low {
+        area(&standing) / reach
     } else {
         0.0
     }
 }
 
-/// The area of the convex hull of points, which are sorted (Andrew's monotone chain, 1979).
-fn hull_area(points: &mut Vec<DVec2>) -> f64 {
+/// The corners of the convex hull of points, one after the other (Andrew's monotone chain, 1979).
+fn hull(mut points: Vec<DVec2>) -> Vec<DVec2> {
     points.sort_unstable_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
     points.dedup();
+    if points.len() < 3 {
+        return points;
+    }
     let chain = |points: &mut dyn Iterator<Item = &DVec2>| {
         let mut chain: Vec<DVec2> = Vec::new();
         for &p in points {
@@ -78,12 +93,19 @@ fn hull_area(points: &mut Vec<DVec2>) -> f64 {
         }
         chain
     };
-    let (below, above) = (chain(&mut points.iter()), chain(&mut points.iter().rev()));
-    let twice = |chain: &[DVec2]| -> f64 {
-        let pairs = chain.windows(2).map(|pair| pair[0].perp_dot(pair[1]));
-        pairs.sum()
-    };
-    (twice(&below) + twice(&above)) / 2.0
+    let (mut below, mut above) = (chain(&mut points.iter()), chain(&mut points.iter().rev()));
+    // Each ends where the other begins.
+    below.pop();
+    above.pop();
+    below.append(&mut above);
+    below
+}
+
+/// The area of a polygon.
+fn area(corners: &[DVec2]) -> f64 {
+    let next = corners.iter().cycle().skip(1);
+    let twice = corners.iter().zip(next).map(|(a, b)| a.perp_dot(*b));
+    twice.sum::<f64>() / 2.0
 }
 
 /// Whether most of a mesh's area is at edges, as that of a machine's part is, so that mean normals would round these off.
