@@ -42,14 +42,16 @@ pub(super) struct WithRays<T> {
     pub(super) things: Vec<T>,
 }
 
-impl<T> WithRays<T> {
-    pub(super) fn with_capacity(count: usize) -> Self {
+impl<T> Default for WithRays<T> {
+    fn default() -> Self {
         Self {
-            rays: Vec::with_capacity(count),
-            things: Vec::with_capacity(count),
+            rays: Vec::new(),
+            things: Vec::new(),
         }
     }
+}
 
+impl<T> WithRays<T> {
     pub(super) fn push(&mut self, ray: Ray, thing: T) {
         self.rays.push(ray);
         self.things.push(thing);
@@ -58,11 +60,6 @@ impl<T> WithRays<T> {
     pub(super) fn clear(&mut self) {
         self.rays.clear();
         self.things.clear();
-    }
-
-    /// All of it, which leaves nothing.
-    fn take(&mut self) -> Self {
-        std::mem::replace(self, Self::with_capacity(0))
     }
 
     /// Cleared, with room for so many.
@@ -339,26 +336,19 @@ thread_local! {
 /// Room for so many paths.
 fn room<C: ColorModel, T: 'static, M: 'static>(count: usize) -> Room<C, T, M> {
     let kept = ROOMS.with_borrow_mut(|rooms| rooms.remove(&TypeId::of::<Room<C, T, M>>()));
-    match kept.and_then(|room| room.downcast::<Room<C, T, M>>().ok()) {
-        Some(room) => {
-            let (walkers, next, shadows, mut hits) = *room;
-            hits.clear();
-            let [walkers, next] = [walkers, next].map(|room| room.emptied(count));
-            (walkers, next, shadows.emptied(count), hits)
-        }
-        None => {
-            let [walkers, next] = [(); 2].map(|()| WithRays::with_capacity(count));
-            (walkers, next, WithRays::with_capacity(count), Vec::new())
-        }
-    }
+    let kept = kept.and_then(|room| room.downcast::<Room<C, T, M>>().ok());
+    let (walkers, next, shadows, mut hits) = *kept.unwrap_or_default();
+    hits.clear();
+    let [walkers, next] = [walkers, next].map(|room| room.emptied(count));
+    (walkers, next, shadows.emptied(count), hits)
 }
 
 impl<C: ColorModel, T: 'static, M: 'static> Drop for Wave<'_, C, T, M> {
     fn drop(&mut self) {
         let room: Room<C, T, M> = (
-            self.walkers.take(),
-            self.next.take(),
-            self.shadows.take(),
+            std::mem::take(&mut self.walkers),
+            std::mem::take(&mut self.next),
+            std::mem::take(&mut self.shadows),
             std::mem::take(&mut self.hits),
         );
         ROOMS.with_borrow_mut(|rooms| rooms.insert(TypeId::of::<Room<C, T, M>>(), Box::new(room)));
