@@ -217,12 +217,23 @@ impl<'a> Members<'a> {
 
     /// A box around all items.
     fn union(&self) -> Bounds {
-        let parts = (0..self.count.div_ceil(GRAIN)).into_par_iter().map(|part| {
-            let end = self.count.min((part + 1).saturating_mul(GRAIN));
-            let boxes = (part * GRAIN..end).map(|item| self.bounds(item));
-            boxes.fold(Bounds::EMPTY, Bounds::union)
+        let ends = self.runs.iter().skip(1).map(|run| run.start);
+        let runs = self.runs.iter().zip(ends.chain([self.count]));
+        let boxes = runs.map(|(run, end)| match run.first.as_instance() {
+            // A mesh is one run.
+            None if let Geometry::Mesh(mesh) = self.shapes.get(run.first.shape) => {
+                let bounds = mesh.mesh().bounds();
+                bounds.map_or(Bounds::EMPTY, |(min, max)| Bounds { min, max })
+            }
+            _ => {
+                let items = (run.start..end)
+                    .into_par_iter()
+                    .with_min_len(GRAIN as usize);
+                let boxes = items.map(|item| self.bounds(item));
+                boxes.reduce(|| Bounds::EMPTY, Bounds::union)
+            }
         });
-        parts.reduce(|| Bounds::EMPTY, Bounds::union)
+        boxes.fold(Bounds::EMPTY, Bounds::union)
     }
 
     /// Boxes that hold all items, each those whose centres are in one cell of a coarse grid over `bounds`.
@@ -386,10 +397,11 @@ impl Group {
                 let all = (0..members.count).collect();
                 (Tree::default(), all, CacheUse::default())
             }
+            Method::Never => (Tree::default(), Vec::new(), CacheUse::default()),
         };
         let bounds = match recipe.method {
             Method::Tree => tree.bounds(),
-            Method::Brute | Method::Exhaustive => members.union(),
+            Method::Brute | Method::Exhaustive | Method::Never => members.union(),
         };
         let parts = match members.instances {
             Some(_) => Vec::new(),

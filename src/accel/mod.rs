@@ -65,6 +65,8 @@ pub enum Method {
     /// A tree: O(P·log O).
     #[default]
     Tree,
+    /// Not at all, each misses: for whoever draws shapes without tracing rays.
+    Never,
 }
 
 /// How much work goes into a tree. More makes rays faster and changes no hit.

@@ -52,7 +52,7 @@ pub trait ColorModel: Clone + std::fmt::Debug + Send + Sync + 'static {
     /// An image's colours, ready to be evaluated: small, for there are millions.
     type Texels: Clone + std::fmt::Debug + Send + Sync;
     /// The wavelengths that one path carries.
-    type Wavelengths: Copy + std::fmt::Debug + Send + Sync;
+    type Wavelengths: Copy + PartialEq + std::fmt::Debug + Send + Sync;
     /// One value for each of them.
     type Sample: Spectral;
     /// The samples of paths in lanes.

@@ -73,17 +73,21 @@ impl Layout {
 
     /// Takes the values of a sample, a channel each, of a pass over the bands into its place in columns. Of light and colours
     /// each pass brings a part, of other channels the first brings all.
-    pub(crate) fn take<'v>(
+    pub(crate) fn take(
         &self,
         pass: u32,
-        values: impl Iterator<Item = &'v f32>,
+        values: &[f32],
         sample: usize,
         columns: &mut [[f32; GROUP]],
     ) {
-        for (channel, (column, value)) in columns.iter_mut().zip(values).enumerate() {
-            if pass == 0 {
+        if pass == 0 {
+            for (column, value) in columns.iter_mut().zip(values) {
                 column[sample] = *value;
-            } else if self.adds_up(channel) {
+            }
+            return;
+        }
+        for (channel, (column, value)) in columns.iter_mut().zip(values).enumerate() {
+            if self.adds_up(channel) {
                 column[sample] += *value;
             }
         }

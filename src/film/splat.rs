@@ -11,6 +11,9 @@ use crate::sensor::Window;
 /// The most samples of a group.
 pub(crate) const GROUP: usize = MAX_LANES;
 
+/// Columns of pixels that samples are added to at once: as many as common filters reach.
+const COLUMNS: usize = 5;
+
 /// The most pixels along an axis that a sample reaches.
 const MAX_REACH: usize = 2 * (MAX_RADIUS as usize + 1) + 1;
 
@@ -154,29 +157,39 @@ impl Task for Splat<'_> {
         let (accepted, refused) = accepted::<F>(group.count, values);
         let [x, y] = group.pixel;
         let reached = group.reached(filter, window);
-        let columns = weights::<F>(filter, &group.offsets[0], reached.x, x, reached.width);
-        let rows = weights::<F>(filter, &group.offsets[1], reached.y, y, reached.height);
-        let left = (reached.x - window.x) as usize;
-        for (py, row) in (reached.y..).zip(&rows[..reached.height as usize]) {
-            let start = (py - window.y) as usize * window.width as usize + left;
-            let pixels = sums[start * stride..].chunks_exact_mut(stride);
-            let down = load::<F>(row);
-            for (pixel, column) in pixels.zip(&columns[..reached.width as usize]) {
-                let mut weight = load::<F>(column);
+        let [first_x, first_y] = [distance(reached.x, x), distance(reached.y, y)];
+        for left in (0..reached.width).step_by(COLUMNS) {
+            let mut columns = [[0.0; GROUP]; COLUMNS];
+            let columns = &mut columns[..COLUMNS.min((reached.width - left) as usize)];
+            for (i, column) in (left..).zip(&mut *columns) {
+                let weight = weights::<F>(filter, &group.offsets[0], first_x + i as f32);
                 for part in 0..parts::<F>() {
-                    weight[part] = F::select(accepted[part], weight[part] * down[part], F::zero());
+                    weight[part].store_to(&mut column[part * F::WIDTH..]);
                 }
-                let [sum, sums @ ..] = pixel else {
-                    return refused;
-                };
-                *sum += f64::from(F::sum(&weight));
-                for (sum, value) in sums.iter_mut().zip(values) {
-                    let mut weighted = load::<F>(value);
+            }
+            let start = (reached.x - window.x + left) as usize;
+            for row in 0..reached.height {
+                let down = weights::<F>(filter, &group.offsets[1], first_y + row as f32);
+                let above = (reached.y - window.y + row) as usize * window.width as usize;
+                let pixels = sums[(above + start) * stride..].chunks_exact_mut(stride);
+                for (pixel, column) in pixels.zip(&*columns) {
+                    let mut weight = load::<F>(column);
                     for part in 0..parts::<F>() {
-                        let product = weighted[part] * weight[part];
-                        weighted[part] = F::select(accepted[part], product, F::zero());
+                        let product = weight[part] * down[part];
+                        weight[part] = F::select(accepted[part], product, F::zero());
                     }
-                    *sum += f64::from(F::sum(&weighted));
+                    let [sum, sums @ ..] = pixel else {
+                        return refused;
+                    };
+                    *sum += f64::from(F::sum(&weight));
+                    for (sum, value) in sums.iter_mut().zip(values) {
+                        let mut weighted = load::<F>(value);
+                        for part in 0..parts::<F>() {
+                            let product = weighted[part] * weight[part];
+                            weighted[part] = F::select(accepted[part], product, F::zero());
+                        }
+                        *sum += f64::from(F::sum(&weighted));
+                    }
                 }
             }
         }
@@ -209,23 +222,12 @@ fn distance(to: u32, own: u32) -> f32 {
     (f64::from(to) - f64::from(own)) as f32 + 0.5
 }
 
-/// The filter's weights along an axis, for `count` pixels from `first` on and the samples of pixel `own`.
+/// The filter's weights along an axis, of samples for a place so far from their pixel's near edge.
 #[inline(always)]
-fn weights<F: Lanes>(
-    filter: &Filter,
-    offsets: &[f32; GROUP],
-    first: u32,
-    own: u32,
-    count: u32,
-) -> [[f32; GROUP]; MAX_REACH] {
-    let mut weights = [[0.0; GROUP]; MAX_REACH];
-    let first = distance(first, own);
-    for (i, row) in weights.iter_mut().take(count as usize).enumerate() {
-        let offsets = load::<F>(offsets);
-        for part in 0..parts::<F>() {
-            let weight = filter.weight(F::splat(first + i as f32) - offsets[part]);
-            weight.store_to(&mut row[part * F::WIDTH..]);
-        }
+fn weights<F: Lanes>(filter: &Filter, offsets: &[f32; GROUP], place: f32) -> Numbers<F> {
+    let mut weights = load::<F>(offsets);
+    for weight in &mut weights[..parts::<F>()] {
+        *weight = filter.weight(F::splat(place) - *weight);
     }
     weights
 }

@@ -201,6 +201,23 @@ impl Sums {
         self.tally.drop(group.pixel, dropped);
     }
 
+    /// Adds a sample of a pixel of the window, a value a channel, in that pixel alone.
+    pub(crate) fn put(&mut self, pixel: [u32; 2], values: &[f32]) {
+        if !values.iter().all(|value| value.is_finite()) {
+            self.tally.drop(pixel, 1);
+            return;
+        }
+        let row = (pixel[1] - self.window.y) as usize * self.window.width as usize;
+        let first = (row + (pixel[0] - self.window.x) as usize) * self.layout.stride();
+        let [weight, sums @ ..] = &mut self.data[first..] else {
+            return;
+        };
+        *weight += 1.0;
+        for (sum, value) in sums.iter_mut().zip(values) {
+            *sum += f64::from(*value);
+        }
+    }
+
     /// Begins splats, where there are any, that a filter spreads; for each pixel of a window so many paths are begun.
     pub(crate) fn begin_splats(&mut self, filter: &Filter, window: &Window, count: u32) {
         let Some(place) = self.layout.splats() else {

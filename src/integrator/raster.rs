@@ -8,15 +8,19 @@
 //! A whole image is drawn by `render`. Where samples come one by one (in parts of images, adaptively, inside of `aov`) rays
 //! find what is seen, and shadow rays are asked; what is shaded is the same.
 
+use glam::Vec3;
+
 use super::limits;
 use super::{Context, Cost, Estimate, Estimates, Estimator, Footprint, Start};
-use crate::color::ColorModel;
+use crate::color::{ColorModel, Spectral as _};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, boolean, choice, float, integer};
 use crate::error::Result;
-use crate::interaction::{Points, Ray};
+use crate::interaction::Ray;
+use crate::math::Frame;
 use crate::raster::{
-    COUNTS, Cull, DepthFormat, Lighting, Pattern, ShadeSettings, Shader, Shading, ShadowSettings,
+    Batch, COUNTS, Cull, DepthFormat, Lighting, Pattern, ShadeSettings, Shader, Shading,
+    ShadowSettings,
 };
 use crate::sampler::Sampler;
 use crate::scene::Scene;
@@ -163,39 +167,42 @@ impl<C: ColorModel> Estimator<C> for Raster {
         cost.closest(scene, 0, &rays, &mut hits);
         estimates.values.clear();
         estimates.extra.clear();
-        let mut blocked = Vec::new();
+        let (mut batch, mut met, mut colors) = (Batch::default(), Vec::new(), Vec::new());
+        let mut answer = Vec::new();
         let footprint = self.footprint.as_ref().filter(|_| scene.has_mipmaps());
-        for (start, hit) in starts.iter().zip(&hits) {
-            let time = start.ray.time;
-            let shader = Shader::new(scene, self.shade, start.wavelengths, time);
-            let estimate = if hit.is_miss() {
-                let (radiance, alpha) = shader.background(&start.ray);
-                Estimate { radiance, alpha }
-            } else {
-                let mut at = scene.interaction(&start.ray, hit);
-                if let Some(footprint) = footprint {
-                    at = footprint.seen(&start.ray, at);
-                }
-                let radiance = shader.met(&start.ray, at, |at, sample| {
-                    let target = sample.target.unwrap_or_default();
-                    let distant = sample.target.is_none();
-                    let shadow =
-                        Points::one(at).shadow(sample.direction.into(), target.into(), distant);
-                    let ray = Ray {
-                        origin: shadow.origin.into(),
-                        direction: shadow.direction.into(),
-                        t_max: shadow.t_max,
-                        time,
-                    };
-                    cost.occluded(scene, &[ray], &mut blocked);
-                    if blocked[0] { 0.0 } else { 1.0 }
-                });
-                Estimate {
-                    radiance,
-                    alpha: 1.0,
-                }
+        let is_alike =
+            |a: &Start<C>, b: &Start<C>| a.wavelengths == b.wavelengths && a.ray.time == b.ray.time;
+        let mut hits = hits.iter();
+        for starts in starts.chunk_by(is_alike) {
+            let shader = Shader::new(scene, self.shade, starts[0].wavelengths, starts[0].ray.time);
+            batch.clear();
+            met.clear();
+            for (Start { ray, .. }, hit) in starts.iter().zip(&mut hits) {
+                let (radiance, alpha) = if hit.is_miss() {
+                    shader.background(ray)
+                } else {
+                    met.push(estimates.values.len());
+                    batch.rays.push(*ray);
+                    batch.hits.push(*hit);
+                    if let Some(footprint) = footprint {
+                        let width = footprint.cone(ray).at(hit.t);
+                        let Frame { s, t, .. } = Frame::around(-ray.direction);
+                        batch.steps.push([s * width, t * width]);
+                    } else if scene.has_mipmaps() {
+                        batch.steps.push([Vec3::ZERO; 2]);
+                    }
+                    (C::Sample::zero(), 1.0)
+                };
+                estimates.values.push(Estimate { radiance, alpha });
+            }
+            let mut blocked = |ray: &Ray| {
+                cost.occluded(scene, &[*ray], &mut answer);
+                answer[0]
             };
-            estimates.values.push(estimate);
+            shader.shade(&batch, Some(&mut blocked), &mut colors);
+            for (slot, color) in met.iter().zip(&colors) {
+                estimates.values[*slot].radiance = *color;
+            }
         }
     }
 }

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::drawn::Drawn;
-use super::fragment::Fragment;
+use super::fragment::{Attributes, Fragment};
 use super::projection::Projection;
 use super::visibility::{Canvas, Visibility};
 use crate::accel::{Counts, Order};
@@ -109,6 +109,9 @@ const NOTHING: usize = 7;
 /// How far apart a pixel's quantities are; `None` where they are not compared.
 type Differences = [Option<f64>; NAMES.len()];
 
+/// What the raster sees at a place.
+type Seen = (Fragment, Attributes);
+
 /// How pixels of a row are counted.
 #[derive(Clone, Copy, Default)]
 struct Tally {
@@ -170,15 +173,22 @@ pub fn agreement<C: ColorModel>(
             }
             let number = visibility.number(y * crop.width as usize + x, 0);
             let place = DVec2::new(x as f64 + 0.5, y as f64 + 0.5) + first;
-            let fragment = number.map(|n| Fragment::new(&drawn, &projection, n, place));
-            let mut apart = differences(sight, fragment.as_ref(), &mut tally);
+            let fragment = |number, place| {
+                let fragment = Fragment::new(&drawn, &projection, number, place);
+                (
+                    fragment,
+                    fragment.attributes(&drawn, &projection, number, place),
+                )
+            };
+            let seen = number.map(|number| fragment(number, place));
+            let mut apart = differences(sight, seen.as_ref(), &mut tally);
             let is_far = |apart: &Option<f64>| apart.is_some_and(|apart| apart > TOLERANCE);
-            if let (Some(number), Some(fragment), true) =
-                (number, &fragment, apart[DEPTH..].iter().any(is_far))
+            if let (Some(number), Some(seen), true) =
+                (number, &seen, apart[DEPTH..].iter().any(is_far))
             {
                 let around = [DVec2::X, DVec2::Y, DVec2::NEG_X, DVec2::NEG_Y]
-                    .map(|way| Fragment::new(&drawn, &projection, number, place + UNKNOWN * way));
-                forgive(&mut apart, sight, fragment, &around);
+                    .map(|way| fragment(number, place + UNKNOWN * way));
+                forgive(&mut apart, sight, seen, &around);
             }
             row.push(Some(apart));
         }
@@ -297,14 +307,14 @@ fn apart(a: Vec3, b: Vec3) -> f64 {
 }
 
 /// Compares a pixel.
-fn differences(sight: &Sight<'_>, fragment: Option<&Fragment>, tally: &mut Tally) -> Differences {
+fn differences(sight: &Sight<'_>, seen: Option<&Seen>, tally: &mut Tally) -> Differences {
     let mut differences = [None; NAMES.len()];
-    let (at, fragment) = match (&sight.at, fragment) {
+    let (at, (fragment, attributes)) = match (&sight.at, seen) {
         (None, None) => {
             differences[NOTHING] = Some(0.0);
             return differences;
         }
-        (Some(at), Some(fragment)) => (at, fragment),
+        (Some(at), Some(seen)) => (at, seen),
         (at, _) => {
             let which = if at.is_some() { SHAPE } else { NOTHING };
             differences[which] = Some(1.0);
@@ -323,17 +333,17 @@ fn differences(sight: &Sight<'_>, fragment: Option<&Fragment>, tally: &mut Tally
     let position = fragment.position.as_vec3();
     differences[POSITION] = Some(apart(position, at.position) / distance);
     let is_same = hit.primitive == at.primitive;
-    if !is_same && fragment.edge < UNKNOWN {
+    if !is_same && attributes.edge < UNKNOWN {
         tally.on_edges += 1;
     } else {
         differences[PRIMITIVE] = unequal(hit.primitive, at.primitive);
     }
     // On another triangle normals and coordinates may be others.
     if is_same {
-        differences[GEO_NORMAL] = Some(apart(fragment.normal, at.normal));
-        let shading = fragment.shading;
+        differences[GEO_NORMAL] = Some(apart(attributes.normal, at.normal));
+        let shading = attributes.shading;
         differences[SH_NORMAL] = shading.map(|normal| apart(normal, at.frame.n));
-        let mut uv = fragment.uv - at.uv;
+        let mut uv = attributes.uv - at.uv;
         if at.mesh.is_none() {
             // Where parameters close on themselves 0 is 1.
             uv = uv.abs().min((1.0 - uv.abs()).abs());
@@ -346,29 +356,27 @@ fn differences(sight: &Sight<'_>, fragment: Option<&Fragment>, tally: &mut Tally
 }
 
 /// Takes away what a quantity changes between a fragment and those around it.
-fn forgive(
-    differences: &mut Differences,
-    sight: &Sight<'_>,
-    fragment: &Fragment,
-    around: &[Fragment; 4],
-) {
+fn forgive(differences: &mut Differences, sight: &Sight<'_>, seen: &Seen, around: &[Seen; 4]) {
     let distance = sight.at.as_ref().map_or(1.0, |at| f64::from(at.t));
-    let mut forgive = |which: usize, change: &dyn Fn(&Fragment) -> f64| {
+    let mut forgive = |which: usize, change: &dyn Fn(&Seen) -> f64| {
         let most = around.iter().map(change).fold(0.0, f64::max);
         if let Some(difference) = differences[which].as_mut().filter(|d| d.is_finite()) {
             *difference = (*difference - most).max(0.0);
         }
     };
-    let way = |other: &Fragment| (other.position - fragment.position).length() / distance;
+    let (fragment, attributes) = seen;
+    let way = |(other, _): &Seen| (other.position - fragment.position).length() / distance;
     forgive(DEPTH, &way);
     forgive(POSITION, &way);
-    forgive(GEO_NORMAL, &|other| apart(other.normal, fragment.normal));
+    forgive(GEO_NORMAL, &|(_, other)| {
+        apart(other.normal, attributes.normal)
+    });
     forgive(
         SH_NORMAL,
-        &|other| match (other.shading, fragment.shading) {
+        &|(_, other)| match (other.shading, attributes.shading) {
             (Some(a), Some(b)) => apart(a, b),
             _ => 0.0,
         },
     );
-    forgive(UV, &|other| (other.uv - fragment.uv).length().into());
+    forgive(UV, &|(_, other)| (other.uv - attributes.uv).length().into());
 }

@@ -81,6 +81,8 @@ pub struct Drawn<'s> {
     warnings: Vec<Problem>,
 }
 
+/// How long edges are of what is not seen, as a part of its radius.
+const UNSEEN: f32 = 1.0 / 16.0;
 /// The most triangles that one primitive becomes.
 const MOST: usize = 1 << 19;
 
@@ -178,6 +180,14 @@ impl<'s> Drawn<'s> {
         (placed, (number - placed.first) as usize)
     }
 
+    /// The corners of the triangle with that number, world space.
+    pub fn corners(&self, number: u32) -> [DVec3; 3] {
+        let (placed, triangle) = self.find(number);
+        let (linear, translation) = placed.matrix();
+        let corners = self.facets(placed).corners(triangle);
+        corners.map(|corner| linear * corner + translation)
+    }
+
     /// How many triangles there are.
     pub fn triangle_count(&self) -> usize {
         let count = |placed| self.facets(placed).triangles.len();
@@ -228,14 +238,19 @@ fn edge(geometry: &Geometry, to_world: Option<&Transform>, projection: &Projecti
     };
     let in_world = (inner.max - inner.min).length();
     let [near, _] = projection.range();
-    let corners = inner.corners().map(|corner| corner.as_dvec3());
-    let nearest = corners.map(|corner| projection.place(corner).a);
-    let nearest = nearest.into_iter().fold(f64::INFINITY, f64::min).max(near);
+    let places = inner
+        .corners()
+        .map(|corner| projection.place(corner.as_dvec3()));
+    let nearest = places.iter().map(|place| place.a);
+    let nearest = nearest.fold(f64::INFINITY, f64::min).max(near);
     // A chord of length h leaves a circle of radius r by h²/8r. A long thing is bent around its second side.
     let sides = (own.max - own.min).to_array();
     let [small, large] = [f32::min, f32::max].map(|pick| pick(pick(sides[0], sides[1]), sides[2]));
     let radius = 0.5 * (sides.iter().sum::<f32>() - small - large).max(diagonal / 512.0);
     let scale = f64::from(diagonal / in_world);
+    if projection.misses_all(&places) {
+        return radius * UNSEEN; // it may cast a shadow all the same
+    }
     let longest = (f64::from(radius) * projection.pixel(nearest) * scale).sqrt();
     (longest as f32).clamp(radius / 128.0, radius / 4.0)
 }
@@ -317,6 +332,11 @@ impl<'s> Facets<'s> {
             triangles,
             kind,
         })
+    }
+
+    /// A triangle's corners.
+    pub(super) fn corners(&self, triangle: usize) -> [DVec3; 3] {
+        self.triangles[triangle].map(|i| self.positions[i as usize].as_dvec3())
     }
 
     /// The shape's primitive that a triangle belongs to.

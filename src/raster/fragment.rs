@@ -9,10 +9,11 @@
 
 use glam::{DMat3, DVec2, DVec3, Vec2, Vec3};
 
-use super::drawn::{Drawn, Facets, FacetsOf, Placed};
+use super::drawn::{Drawn, FacetsOf, Placed};
 use super::projection::{Line, Place, Projection};
 use crate::interaction::{Hit, Ray};
-use crate::shape::SurfaceSample;
+use crate::mesh::Mesh;
+use crate::shape::{Geometry, SurfaceSample};
 
 /// A point of a surface that is seen.
 #[derive(Clone, Copy, Debug)]
@@ -23,21 +24,23 @@ pub struct Fragment {
     pub a: f64,
     /// World space.
     pub position: DVec3,
+    /// The barycentric coordinates of the place on the triangle.
+    pub weights: [f64; 3],
+    /// The same point as the patch knows it that the triangle stands for.
+    on_patch: Option<SurfaceSample>,
+}
+
+/// What is known of the surface at a fragment.
+#[derive(Clone, Copy, Debug)]
+pub struct Attributes {
     /// The geometric normal, unit length.
     pub normal: Vec3,
     /// The interpolated normal, unit length; `None` for a mesh that deforms.
     pub shading: Option<Vec3>,
     /// Texture coordinates.
     pub uv: Vec2,
-    /// How far to its side the neighbouring pixels look, to the right and down, world space: along their rays these are
-    /// points of the surface.
-    pub steps: [Vec3; 2],
     /// How far the place is from the triangle's nearest edge, in pixels.
     pub edge: f64,
-    /// The triangle's corners, world space.
-    pub corners: [DVec3; 3],
-    /// The barycentric coordinates of the place on it.
-    pub weights: [f64; 3],
 }
 
 impl Fragment {
@@ -46,19 +49,10 @@ impl Fragment {
         let (placed, triangle) = drawn.find(number);
         let facets = drawn.facets(placed);
         let (linear, translation) = placed.matrix();
-        let corners = facets.triangles[triangle].map(|i| facets.positions[i as usize].as_dvec3());
-        let (matrix, offset) = projection.along_ways(linear, translation);
-        let places = corners.map(|corner| projection.placed(matrix * corner + offset));
+        let corners = facets.corners(triangle);
+        let places = places(projection, placed, &corners);
         let weights = weights(&places, at);
         let local = corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2];
-        let a = places[0].a * weights[0] + places[1].a * weights[1] + places[2].a * weights[2];
-        let seen = Seen {
-            facets,
-            triangle,
-            weights,
-            local,
-            a,
-        };
         let mut fragment = Self {
             hit: Hit {
                 t: 0.0,
@@ -68,54 +62,81 @@ impl Fragment {
                 shape: placed.shape,
                 primitive: facets.primitive(triangle),
             },
-            a,
+            a: places[0].a * weights[0] + places[1].a * weights[1] + places[2].a * weights[2],
             position: linear * local + translation,
-            normal: Vec3::ZERO,
-            shading: None,
-            uv: Vec2::ZERO,
-            steps: [Vec3::ZERO; 2],
-            edge: f64::INFINITY,
-            corners: corners.map(|corner| linear * corner + translation),
             weights,
+            on_patch: None,
         };
-        let line = projection.line(at);
-        let local_normal = match &facets.kind {
-            FacetsOf::Patches { .. } => {
-                let inverse = linear.inverse();
-                let own = Line {
-                    origin: inverse * (line.origin - translation),
-                    way: inverse * line.way,
-                };
-                let point = seen.on_patch(&own);
-                fragment.a = point.a;
-                fragment.position = line.at(point.a);
-                fragment.shading = Some(normal_in_world(placed, point.sample.normal));
-                fragment.uv = facets.geometry.uv(&point.sample);
-                (fragment.hit.u, fragment.hit.v) = (0.0, 0.0);
-                point.sample.normal
-            }
-            kind => {
-                fragment.edge = distance_to_edges(&places, at);
-                let normal = match kind {
-                    FacetsOf::Plane(normal) => *normal,
-                    _ => {
-                        let [a, b, c] = corners;
-                        (b - a).cross(c - a).normalize_or_zero().as_vec3()
-                    }
-                };
-                fragment.uv = facets.geometry.uv(&seen.sample(normal, &fragment.hit));
-                fragment.shading = match kind {
-                    FacetsOf::Mesh(_) => Some(seen.shading(normal)),
-                    FacetsOf::Plane(_) => Some(normal),
-                    _ => None,
-                }
-                .map(|normal| normal_in_world(placed, normal));
-                normal
-            }
-        };
-        fragment.normal = normal_in_world(placed, local_normal);
-        fragment.steps = projection.steps(fragment.a).map(|step| step.as_vec3());
+        if let FacetsOf::Patches { parameters, .. } = &facets.kind {
+            let line = projection.line(at);
+            let inverse = linear.inverse();
+            let own = Line {
+                origin: inverse * (line.origin - translation),
+                way: inverse * line.way,
+            };
+            let begun = Begun {
+                geometry: facets.geometry,
+                primitive: fragment.hit.primitive,
+                parameters: facets.triangles[triangle].map(|i| parameters[i as usize].as_dvec2()),
+                weights,
+                local,
+                a: fragment.a,
+            };
+            let point = begun.on_patch(&own);
+            fragment.a = point.a;
+            fragment.position = line.at(point.a);
+            (fragment.hit.u, fragment.hit.v) = point.sample.barycentric.into();
+            fragment.on_patch = Some(point.sample);
+        }
         fragment
+    }
+
+    /// What is known of the surface there, of the arguments of [`Fragment::new`].
+    pub fn attributes(
+        &self,
+        drawn: &Drawn<'_>,
+        projection: &Projection,
+        number: u32,
+        at: DVec2,
+    ) -> Attributes {
+        let (placed, triangle) = drawn.find(number);
+        let facets = drawn.facets(placed);
+        if let Some(sample) = &self.on_patch {
+            let normal = normal_in_world(placed, sample.normal);
+            return Attributes {
+                normal,
+                shading: Some(normal),
+                uv: facets.geometry.uv(sample),
+                edge: f64::INFINITY,
+            };
+        }
+        let corners = facets.corners(triangle);
+        let [a, b, c] = corners;
+        let normal = match facets.kind {
+            FacetsOf::Plane(normal) => normal,
+            _ => (b - a).cross(c - a).normalize_or_zero().as_vec3(),
+        };
+        let [u, v, w] = self.weights;
+        let sample = SurfaceSample {
+            position: (a * u + b * v + c * w).as_vec3(),
+            normal,
+            primitive: self.hit.primitive,
+            barycentric: Vec2::new(self.hit.u, self.hit.v),
+            pdf: 0.0,
+        };
+        let shading = match facets.kind {
+            FacetsOf::Mesh(mesh) => {
+                Some(interpolated(mesh, facets.triangles[triangle], self.weights).unwrap_or(normal))
+            }
+            FacetsOf::Plane(_) => Some(normal),
+            _ => None,
+        };
+        Attributes {
+            normal: normal_in_world(placed, normal),
+            shading: shading.map(|normal| normal_in_world(placed, normal)),
+            uv: facets.geometry.uv(&sample),
+            edge: distance_to_edges(&places(projection, placed, &corners), at),
+        }
     }
 
     /// The hit of the ray that goes through the place.
@@ -126,6 +147,23 @@ impl Fragment {
             ..self.hit
         }
     }
+}
+
+/// Where the corners of a shape's triangle are in the picture.
+fn places(projection: &Projection, placed: &Placed, corners: &[DVec3; 3]) -> [Place; 3] {
+    let (linear, translation) = placed.matrix();
+    let (matrix, offset) = projection.along_ways(linear, translation);
+    corners.map(|corner| projection.placed(matrix * corner + offset))
+}
+
+/// The interpolated normal of a mesh, if it has any.
+fn interpolated(mesh: &Mesh, corners: [u32; 3], [u, v, w]: [f64; 3]) -> Option<Vec3> {
+    if mesh.normals.is_empty() {
+        return None;
+    }
+    let [a, b, c] = corners.map(|i| mesh.normals[i as usize].as_dvec3());
+    let normal = (a * u + b * v + c * w).normalize_or_zero().as_vec3();
+    (normal != Vec3::ZERO).then_some(normal)
 }
 
 /// A normal of a shape's space in the world.
@@ -170,10 +208,12 @@ fn distance_to_edges(places: &[Place; 3], at: DVec2) -> f64 {
     distance(a, b).min(distance(b, c)).min(distance(c, a))
 }
 
-/// A point of a triangle, in the shape's space.
-struct Seen<'a> {
-    facets: &'a Facets<'a>,
-    triangle: usize,
+/// Where the search for a patch's point begins: at the point of the triangle that stands for it, in the shape's space.
+struct Begun<'a> {
+    geometry: &'a Geometry,
+    primitive: u32,
+    /// Of the corners.
+    parameters: [DVec2; 3],
     weights: [f64; 3],
     local: DVec3,
     a: f64,
@@ -185,53 +225,18 @@ struct OnPatch {
     a: f64,
 }
 
-impl Seen<'_> {
-    /// As shapes know points.
-    fn sample(&self, normal: Vec3, hit: &Hit) -> SurfaceSample {
-        SurfaceSample {
-            position: self.local.as_vec3(),
-            normal,
-            primitive: hit.primitive,
-            barycentric: Vec2::new(hit.u, hit.v),
-            pdf: 0.0,
-        }
-    }
-
-    /// The interpolated normal of a mesh, or the geometric one where it has none.
-    fn shading(&self, geometric: Vec3) -> Vec3 {
-        let FacetsOf::Mesh(mesh) = self.facets.kind else {
-            return geometric;
-        };
-        if mesh.normals.is_empty() {
-            return geometric;
-        }
-        let corners = self.facets.triangles[self.triangle];
-        let [a, b, c] = corners.map(|i| mesh.normals[i as usize].as_dvec3());
-        let [u, v, w] = self.weights;
-        let normal = (a * u + b * v + c * w).normalize_or_zero().as_vec3();
-        if normal == Vec3::ZERO {
-            geometric
-        } else {
-            normal
-        }
-    }
-
+impl Begun<'_> {
     /// Where the line meets the patch that the triangle stands for: Newton's method for the parameters and `a`. Where that
     /// does not converge it is the triangle's point, with the patch's normal there.
     fn on_patch(&self, line: &Line) -> OnPatch {
         /// Half a step of parameters between places whose difference is a derivative.
         const STEP: f32 = 1.0 / 512.0;
         const ROUNDS: u32 = 12;
-        let FacetsOf::Patches { parameters, .. } = &self.facets.kind else {
-            unreachable!("only patches are asked");
-        };
-        let primitive = self.facets.primitive(self.triangle);
-        let corners = self.facets.triangles[self.triangle];
-        let [a, b, c] = corners.map(|i| parameters[i as usize].as_dvec2());
+        let [a, b, c] = self.parameters;
         let [u, v, w] = self.weights;
         let start = a * u + b * v + c * w;
         let at = |parameters: DVec2| {
-            let chart = self.facets.geometry.patch(primitive, parameters.as_vec2());
+            let chart = self.geometry.patch(self.primitive, parameters.as_vec2());
             chart.expect("it was cut into triangles").point
         };
         let (mut place, mut along) = (start, self.a);
@@ -289,7 +294,7 @@ impl Seen<'_> {
                     true => line.at(along).as_vec3(),
                     false => sample.position,
                 },
-                primitive,
+                primitive: self.primitive,
                 ..sample
             },
             a: along,

@@ -17,7 +17,6 @@ mod drawn;
 mod fragment;
 mod visibility;
 
-mod around;
 mod shade;
 mod shadow;
 
@@ -26,10 +25,10 @@ mod agreement;
 pub use agreement::{ALLOWED, Agreement, Quantity, TOLERANCE, agreement};
 pub use depth::DepthFormat;
 pub use drawn::Drawn;
-pub use fragment::Fragment;
+pub use fragment::{Attributes, Fragment};
 pub use pattern::{COUNTS, Pattern};
 pub use projection::{Line, Place, Projection};
-pub use shade::{Lighting, ShadeSettings, Shader, Shading};
+pub use shade::{Batch, Blocked, Lighting, ShadeSettings, Shader, Shading};
 pub use shadow::ShadowSettings;
 pub use visibility::{Canvas, Cull, Visibility};
 

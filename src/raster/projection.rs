@@ -26,6 +26,8 @@ pub struct Projection {
     near: f64,
     /// And where it ends.
     far: f64,
+    /// Of the whole picture, in pixels.
+    size: DVec2,
 }
 
 /// A point in homogeneous coordinates: the place in the picture is (x/w, y/w).
@@ -155,6 +157,7 @@ impl Projection {
             is_perspective,
             near,
             far,
+            size: DVec2::ONE,
         })
     }
 
@@ -167,7 +170,8 @@ impl Projection {
         } = self.ways;
         let ways = DMat3::from_cols(x_axis / size.x, y_axis / size.y, z_axis);
         let range = [self.near, self.far];
-        Self::new(self.origin, ways, self.is_perspective, range)
+        let pixels = Self::new(self.origin, ways, self.is_perspective, range)?;
+        Some(Self { size, ..pixels })
     }
 
     /// Where a point is.
@@ -211,21 +215,27 @@ impl Projection {
         [self.ways.x_axis * scale, self.ways.y_axis * scale]
     }
 
+    /// Whether nothing of what these places are the corners of is seen in the picture, as [`Projection::misses`] has it.
+    pub(super) fn misses_all(&self, corners: &[Place]) -> bool {
+        self.misses_between(corners, DVec2::ZERO, self.size)
+    }
+
     /// Whether nothing of what these places are the corners of is seen in a window: all of it is before the range or beyond it,
     /// or to one side of the window.
     pub(super) fn misses(&self, corners: &[Place], window: &Window) -> bool {
-        let [left, top] = [window.x, window.y].map(f64::from);
-        let (right, bottom) = (
-            left + f64::from(window.width),
-            top + f64::from(window.height),
-        );
+        let first = DVec2::new(window.x.into(), window.y.into());
+        let size = DVec2::new(window.width.into(), window.height.into());
+        self.misses_between(corners, first, first + size)
+    }
+
+    fn misses_between(&self, corners: &[Place], first: DVec2, last: DVec2) -> bool {
         let all = |out: &dyn Fn(&Place) -> bool| corners.iter().all(out);
         all(&|p| p.a < self.near)
             || all(&|p| p.a > self.far)
-            || all(&|p| p.x < left * p.w)
-            || all(&|p| p.x > right * p.w)
-            || all(&|p| p.y < top * p.w)
-            || all(&|p| p.y > bottom * p.w)
+            || all(&|p| p.x < first.x * p.w)
+            || all(&|p| p.x > last.x * p.w)
+            || all(&|p| p.y < first.y * p.w)
+            || all(&|p| p.y > last.y * p.w)
     }
 
     /// How large a pixel is at a place that far along its ray, in world units.

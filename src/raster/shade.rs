@@ -8,14 +8,16 @@ use std::f32::consts::FRAC_1_PI;
 
 use glam::{Vec2, Vec3};
 
-use super::around::{Around, DIRECTIONS};
 use super::drawn::Drawn;
 use super::fragment::Fragment;
+use super::projection::Projection;
 use super::shadow::{ShadowMap, ShadowSettings, Source};
+use crate::accel::Met;
 use crate::color::{ColorModel, Spectra as _, Spectral};
 use crate::error::Result;
 use crate::interaction::{Hit, Interaction, Points, Ray, Reference};
-use crate::light::LightSample;
+use crate::lanes::{self, Lanes, MAX_LANES, Mask as _, Task};
+use crate::light::LightSamples;
 use crate::material::{BsdfSample, Material};
 use crate::scene::{LightId, Scene};
 
@@ -54,11 +56,31 @@ pub struct ShadeSettings {
     pub hide_emitters: bool,
 }
 
+/// Points that are seen.
+#[derive(Clone, Debug, Default)]
+pub struct Batch {
+    /// The rays that see them.
+    pub rays: Vec<Ray>,
+    /// What each has met; none missed.
+    pub hits: Vec<Hit>,
+    /// How far to its side the neighbours of each look, to the right and down, world space; only of scenes with mipmaps.
+    pub steps: Vec<[Vec3; 2]>,
+}
+
+impl Batch {
+    /// Takes all points out.
+    pub fn clear(&mut self) {
+        self.rays.clear();
+        self.hits.clear();
+        self.steps.clear();
+    }
+}
+
 /// What a light comes to.
 #[derive(Debug)]
 enum Lamp<S> {
-    /// One all around.
-    Around(Box<Around<S>>),
+    /// One all around: directions from which it shines, each with what it brings at right angles.
+    Around(Vec<(Vec3, S)>),
     /// One that is asked for every point, and what it sees.
     Single(LightId, Option<ShadowMap>),
 }
@@ -74,6 +96,9 @@ pub struct Shader<'s, C: ColorModel> {
     wavelengths: C::Wavelengths,
     time: f32,
 }
+
+/// From how many directions an environment shines.
+const DIRECTIONS: u32 = 16;
 
 /// A number in [0, 1) whose digits are those of `i` turned around.
 fn radical_inverse(i: u32) -> f32 {
@@ -98,12 +123,12 @@ impl<'s, C: ColorModel> Shader<'s, C> {
                 return Lamp::Single(id, None);
             }
             let each = 1.0 / DIRECTIONS as f32;
-            let around = Around::new(|i| {
+            let around = (0..DIRECTIONS).filter_map(|i| {
                 let u = Vec2::new((i as f32 + 0.5) * each, radical_inverse(i) + 0.5 * each);
                 let sample = light.sample(from, u, &wavelengths)?;
                 Some((sample.direction, sample.radiance * (each / sample.pdf)))
             });
-            Lamp::Around(Box::new(around))
+            Lamp::Around(around.collect())
         });
         let mirrors = (0..scene.material_count())
             .map(|i| scene.has_environment() && is_mirror(scene.material_at(i), &wavelengths));
@@ -172,20 +197,35 @@ impl<'s, C: ColorModel> Shader<'s, C> {
         )
     }
 
-    /// A fragment that `ray` goes to.
-    pub fn fragment(&self, ray: &Ray, fragment: &Fragment, is_perspective: bool) -> C::Sample {
+    /// Adds to a batch the points whose colours make up that of the fragment with that number, which `ray` goes to, and tells of
+    /// each its weight: the fragment itself, or the corners of its triangle.
+    pub fn add_points(
+        &self,
+        batch: &mut Batch,
+        (drawn, projection): (&Drawn<'_>, &Projection),
+        number: u32,
+        (ray, fragment): (&Ray, &Fragment),
+        weights: &mut Vec<f32>,
+    ) {
         let hit = fragment.hit_of(ray);
-        if self.settings.shading == Shading::Phong {
-            let mut at = self.scene.interaction(ray, &hit);
+        let mut add = |ray: Ray, hit: Hit, steps: [Vec3; 2], weight: f32| {
+            batch.rays.push(ray);
+            batch.hits.push(hit);
             if self.scene.has_mipmaps() {
-                at = at.seen_beside(-ray.direction, fragment.steps);
+                batch.steps.push(steps);
             }
-            return self.point(ray, at, &mut |_, at, _, lamp| self.in_map(at, lamp));
+            weights.push(weight);
+        };
+        if self.settings.shading == Shading::Phong {
+            let steps = projection.steps(fragment.a).map(|step| step.as_vec3());
+            add(*ray, hit, steps, 1.0);
+            return;
         }
-        let mut sum = C::Sample::zero();
-        for (corner, weight) in fragment.weights.iter().enumerate() {
-            let place = fragment.corners[corner].as_vec3();
-            let (origin, direction) = match is_perspective {
+        let of_mesh = self.scene.tracer().shape(hit.shape).mesh().is_some();
+        let corners = drawn.corners(number).into_iter().zip(fragment.weights);
+        for (corner, (place, weight)) in corners.enumerate() {
+            let place = place.as_vec3();
+            let (origin, direction) = match projection.is_perspective() {
                 true => (ray.origin, (place - ray.origin).normalize()),
                 false => (place - hit.t * ray.direction, ray.direction),
             };
@@ -194,13 +234,9 @@ impl<'s, C: ColorModel> Shader<'s, C> {
                 direction,
                 ..*ray
             };
-            let of_mesh = self.scene.tracer().shape(hit.shape).mesh().is_some();
-            let at = |number| {
-                if of_mesh && corner == number {
-                    1.0
-                } else {
-                    0.0
-                }
+            let at = |number| match of_mesh && corner == number {
+                true => 1.0,
+                false => 0.0,
             };
             let hit = Hit {
                 t: (place - origin).length(),
@@ -208,96 +244,33 @@ impl<'s, C: ColorModel> Shader<'s, C> {
                 v: at(2),
                 ..hit
             };
-            let at = self.scene.interaction(&to_corner, &hit);
-            let color = self.point(&to_corner, at, &mut |_, at, _, lamp| self.in_map(at, lamp));
-            sum += color * *weight as f32;
+            add(to_corner, hit, [Vec3::ZERO; 2], weight as f32);
         }
-        sum
     }
 
-    /// A point as rays find it, with `visible` for how much of a light a point gets.
-    pub fn met(
+    /// What points look like. Where `blocked` is given it says what lies on rays to lights, in place of the maps.
+    pub fn shade(
         &self,
-        ray: &Ray,
-        at: Interaction<'_>,
-        mut visible: impl FnMut(&Interaction<'_>, &LightSample<C::Sample>) -> f32,
-    ) -> C::Sample {
-        self.point(
-            ray,
-            at,
-            &mut |_, at, sample, _| match self.settings.shadows {
-                Some(_) => visible(at, sample),
-                None => 1.0,
-            },
-        )
-    }
-
-    fn in_map(&self, at: &Interaction<'_>, (cosine, map): (f32, Option<&ShadowMap>)) -> f32 {
-        map.map_or(1.0, |map| map.lit(at.position, cosine))
-    }
-
-    fn point(&self, ray: &Ray, at: Interaction<'_>, visible: &mut Visible<'_, C>) -> C::Sample {
-        let (scene, w) = (self.scene, &self.wavelengths);
-        let material = scene.material(&at);
-        let mut lit = C::Sample::zero();
-        if let Some(ambient) = scene.ambient(&at, w) {
-            lit += ambient;
-        }
-        let points = Points::one(&at);
-        let terms = |direction: Vec3| {
-            let wo = at.frame.to_local(direction);
-            let w = std::slice::from_ref(w);
-            let terms = material.phong_lanes::<f32>(&points, at.wi.into(), wo.into(), w);
-            let (diffuse, specular): (C::Sample, C::Sample) =
-                (terms.diffuse.sample(0), terms.specular.sample(0));
-            diffuse + specular
-        };
-        let lamps = if material.is_smooth() {
-            &self.lamps[..]
-        } else {
-            &[]
-        };
-        for lamp in lamps {
-            match lamp {
-                Lamp::Around(around) => {
-                    lit += around.lit(scene.tracer().kernel(), &at, material, w);
-                }
-                Lamp::Single(id, map) => {
-                    let light = &scene.lights()[id.index()];
-                    let Some(sample) = light.sample(at.reference(), MIDDLE, w) else {
-                        continue;
-                    };
-                    let seen: C::Sample = terms(sample.direction);
-                    if seen.is_black() {
-                        continue;
-                    }
-                    // What a light sample brings has the inverse square in it.
-                    let squared = match (self.settings.lighting, sample.target) {
-                        (Lighting::Textbook, Some(target)) => {
-                            (target - at.position).length_squared()
-                        }
-                        _ => 1.0,
-                    };
-                    let cosine = at.normal.dot(sample.direction);
-                    let share = visible(*id, &at, &sample, (cosine, map.as_ref()));
-                    if share > 0.0 {
-                        lit += seen * sample.radiance * (share * squared / sample.pdf);
-                    }
-                }
-            }
-        }
-        if self.settings.lighting == Lighting::Radiometric {
-            lit = lit * FRAC_1_PI;
-        }
-        if let (false, Some((emission, _))) = (
-            self.settings.hide_emitters,
-            scene.emitted(&at, ray.origin, w),
-        ) {
-            lit += emission;
-        }
-        match self.mirrors[scene.made_of(at.shape).index()] {
-            true => lit + self.mirrored(&at),
-            false => lit,
+        batch: &Batch,
+        mut blocked: Option<&mut Blocked<'_>>,
+        colors: &mut Vec<C::Sample>,
+    ) {
+        let material = |i: u32| self.scene.material_of(&batch.hits[i as usize]).index();
+        let mut indices: Vec<u32> = (0..batch.hits.len() as u32).collect();
+        indices.sort_by_key(|i| material(*i));
+        colors.clear();
+        colors.resize(batch.hits.len(), C::Sample::zero());
+        for run in indices.chunk_by(|a, b| material(*a) == material(*b)) {
+            let of_one = OfOneMaterial {
+                shader: self,
+                material: self.scene.material_at(material(run[0])),
+                is_mirror: self.mirrors[material(run[0])],
+                batch,
+                indices: run,
+                blocked: blocked.as_deref_mut(),
+                colors,
+            };
+            C::run(self.scene.tracer().kernel(), of_one);
         }
     }
 
@@ -330,14 +303,182 @@ impl<'s, C: ColorModel> Shader<'s, C> {
     }
 }
 
-/// How much of a light a point gets, of which a sample was taken; with the cosine at the surface and the light's map.
-type Visible<'a, C> = dyn FnMut(
-        LightId,
-        &Interaction<'_>,
-        &LightSample<<C as ColorModel>::Sample>,
-        (f32, Option<&ShadowMap>),
-    ) -> f32
-    + 'a;
+/// Whether anything lies on a ray to a light.
+pub type Blocked<'a> = dyn FnMut(&Ray) -> bool + 'a;
+
+/// Points of one material.
+struct OfOneMaterial<'a, 'b, C: ColorModel> {
+    shader: &'a Shader<'a, C>,
+    material: &'a Material<C>,
+    is_mirror: bool,
+    batch: &'a Batch,
+    indices: &'a [u32],
+    blocked: Option<&'a mut Blocked<'b>>,
+    colors: &'a mut [C::Sample],
+}
+
+impl<C: ColorModel> Task for OfOneMaterial<'_, '_, C> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<F: Lanes>(mut self) {
+        let (shader, batch) = (self.shader, self.batch);
+        let (scene, w) = (shader.scene, &shader.wavelengths);
+        for indices in self.indices.chunks(F::WIDTH) {
+            let met = Met {
+                tracer: scene.tracer(),
+                rays: &batch.rays,
+                hits: &batch.hits,
+                indices,
+            };
+            let mut at = met.points::<F>();
+            if scene.has_mipmaps() {
+                let mut rows = [[F::ROW; 3]; 2];
+                for (lane, index) in indices.iter().enumerate() {
+                    for (rows, step) in rows.iter_mut().zip(batch.steps[*index as usize]) {
+                        for (row, value) in rows.iter_mut().zip(step.to_array()) {
+                            row[lane] = value;
+                        }
+                    }
+                }
+                at.footprint = at.beside(
+                    -met.directions(),
+                    rows.map(|rows| lanes::Vec3::<F>::load(&rows)),
+                );
+            }
+            let lit = self.lit(&met, &at).rows();
+            for (lane, index) in indices.iter().enumerate() {
+                let mut color: C::Sample = C::Columns::<F>::of(&lit, lane);
+                let shines = !shader.settings.hide_emitters && scene.shines(met.hit(lane).shape);
+                if shines || self.is_mirror {
+                    let at = at.lane(lane);
+                    let origin = met.ray(lane).origin;
+                    if let (true, Some((emission, _))) = (shines, scene.emitted(&at, origin, w)) {
+                        color += emission;
+                    }
+                    if self.is_mirror {
+                        color += shader.mirrored(&at);
+                    }
+                }
+                self.colors[*index as usize] = color;
+            }
+        }
+    }
+}
+
+impl<C: ColorModel> OfOneMaterial<'_, '_, C> {
+    /// What points return of the scene's lights.
+    #[inline(always)]
+    fn lit<F: Lanes>(&mut self, met: &Met<'_>, at: &Points<'_, F>) -> C::Columns<F> {
+        let (shader, material) = (self.shader, self.material);
+        let scene = shader.scene;
+        let w = &[shader.wavelengths; MAX_LANES];
+        let mut lit = C::Columns::<F>::zero();
+        if scene.has_ambient() {
+            lit = C::Columns::<F>::from_samples(|lane| match lane < met.indices.len() {
+                true => scene
+                    .ambient(&at.lane(lane), &w[0])
+                    .unwrap_or(C::Sample::zero()),
+                false => C::Sample::zero(),
+            });
+        }
+        let lamps = if material.is_smooth() {
+            &shader.lamps[..]
+        } else {
+            &[]
+        };
+        for lamp in lamps {
+            match lamp {
+                Lamp::Around(around) => {
+                    let mut sum = C::Columns::<F>::zero();
+                    for (direction, brought) in around {
+                        let returned = self.returned(at, lanes::Vec3::all(*direction), w);
+                        sum = sum + returned * C::Columns::<F>::from_samples(|_| *brought);
+                    }
+                    lit = lit + sum;
+                }
+                Lamp::Single(id, map) => {
+                    let light = &scene.lights()[id.index()];
+                    let sample = light.sample_lanes(at, lanes::Vec2::all(MIDDLE), w, at.active);
+                    let returned = self.returned(at, sample.direction, w);
+                    let asked = at.active & F::zero().lt(sample.pdf) & !returned.is_black();
+                    if !asked.any() {
+                        continue;
+                    }
+                    let share = self.shares(met, at, &sample, asked, map.as_ref());
+                    // What a light sample brings has the inverse square in it.
+                    let squared = match shader.settings.lighting {
+                        Lighting::Textbook => {
+                            let squared = (sample.target - at.position).length_squared();
+                            F::select(sample.distant, F::one(), squared)
+                        }
+                        _ => F::one(),
+                    };
+                    let brought = sample.radiance * returned * (share * squared / sample.pdf);
+                    let seen = asked & F::zero().lt(share);
+                    lit = lit + C::Columns::<F>::select(seen, brought, C::Columns::<F>::zero());
+                }
+            }
+        }
+        match shader.settings.lighting {
+            Lighting::Radiometric => lit * F::splat(FRAC_1_PI),
+            _ => lit,
+        }
+    }
+
+    /// What the material returns of light from a direction, by Phong's equation.
+    #[inline(always)]
+    fn returned<F: Lanes>(
+        &self,
+        at: &Points<'_, F>,
+        direction: lanes::Vec3<F>,
+        w: &[C::Wavelengths],
+    ) -> C::Columns<F> {
+        let wo = at.frame.to_local(direction);
+        let terms = self.material.phong_lanes(at, at.wi, wo, w);
+        terms.diffuse + terms.specular
+    }
+
+    /// How much of a light those points get that are `asked`.
+    #[inline(always)]
+    fn shares<F: Lanes>(
+        &mut self,
+        met: &Met<'_>,
+        at: &Points<'_, F>,
+        sample: &LightSamples<F, C::Columns<F>>,
+        asked: F::Mask,
+        map: Option<&ShadowMap>,
+    ) -> F {
+        if self.shader.settings.shadows.is_none() {
+            return F::one();
+        }
+        let mut shares = F::ROW;
+        if let Some(blocked) = self.blocked.as_mut() {
+            let rays = at.shadow(sample.direction, sample.target, sample.distant);
+            let (origins, directions) = (rays.origin.rows(), rays.direction.rows());
+            let ends = rays.t_max.row();
+            for lane in asked.lanes() {
+                let is_blocked = blocked(&Ray {
+                    origin: lanes::Vec3::<F>::of(&origins, lane),
+                    direction: lanes::Vec3::<F>::of(&directions, lane),
+                    t_max: ends[lane],
+                    time: met.ray(lane).time,
+                });
+                shares[lane] = if is_blocked { 0.0 } else { 1.0 };
+            }
+            return F::load(&shares);
+        }
+        let Some(map) = map else {
+            return F::one();
+        };
+        let (positions, cosines) = (at.position.rows(), at.normal.dot(sample.direction).row());
+        for lane in asked.lanes() {
+            let position = lanes::Vec3::<F>::of(&positions, lane);
+            shares[lane] = map.lit(position, cosines[lane]);
+        }
+        F::load(&shares)
+    }
+}
 
 /// The two ends of what chooses a lobe.
 const ENDS: [f32; 2] = [1e-4, 0.9999];

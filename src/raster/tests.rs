@@ -130,7 +130,8 @@ fn culling_takes_the_side_that_normals_tell() {
                 };
                 let place = DVec2::new((pixel % 80) as f64 + 0.5, (pixel / 80) as f64 + 0.5);
                 let fragment = Fragment::new(&drawn, &projection, number, place);
-                let is_front = fragment.normal.as_dvec3().dot(projection.line(place).way) < 0.0;
+                let attributes = fragment.attributes(&drawn, &projection, number, place);
+                let is_front = attributes.normal.as_dvec3().dot(projection.line(place).way) < 0.0;
                 assert_eq!(is_front, cull == Cull::Back, "{flip} {mirrored}");
             }
         }

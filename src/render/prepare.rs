@@ -338,7 +338,7 @@ impl<'a> Ask<'a> {
     fn method(&self) -> Method {
         match self.traced {
             true => self.options.method,
-            false => Method::Brute,
+            false => Method::Never,
         }
     }
 }
@@ -400,7 +400,7 @@ fn make<C: ColorModel>(
         film,
         assets: assets.bytes() as u64,
         trees: match options.method {
-            Method::Brute | Method::Exhaustive => 0,
+            Method::Brute | Method::Exhaustive | Method::Never => 0,
             // An instance stands in the world's tree like a primitive.
             Method::Tree => memory::trees(primitives + assets.instance_count()),
         },
@@ -422,7 +422,7 @@ fn make<C: ColorModel>(
             return scene::build(description, &assets, color, recipe);
         };
         let treeless = Recipe {
-            method: Method::Brute,
+            method: Method::Never,
             ..recipe.clone()
         };
         let scene = scene::build(description, &assets, color, treeless)?;

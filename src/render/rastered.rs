@@ -2,6 +2,8 @@
 //! once, then shaded by bands of rows. A pixel is the mean of its samples, each triangle in it shaded once: the film's filter
 //! and sampler have no part in it.
 
+use std::ops::Range;
+
 use glam::{DVec2, Vec2};
 
 use super::options::Options;
@@ -13,13 +15,13 @@ use super::unit;
 use crate::color::{ColorModel, Spectral as _};
 use crate::description::{Description, Kind};
 use crate::error::{Error, Problem, Result};
-use crate::film::{Accumulator as _, GROUP, Group, Layout, Sums};
+use crate::film::{Accumulator as _, GROUP, Layout, Sums};
 use crate::filter::Filter;
 use crate::image::Image;
 use crate::integrator::Raster;
 use crate::interaction::Ray;
 use crate::material::Material;
-use crate::raster::{Canvas, Drawn, Fragment, Projection, Shader, Visibility};
+use crate::raster::{Batch, Canvas, Drawn, Fragment, Projection, Shader, Visibility};
 use crate::scene::Scene;
 use crate::sensor::{Film, Window};
 
@@ -196,6 +198,53 @@ fn film(film: &Film) -> Film {
     }
 }
 
+/// What is seen in a row of pixels.
+#[derive(Default)]
+struct Row {
+    /// Points, with their weights.
+    batch: Batch,
+    weights: Vec<f32>,
+    /// Of the pixels from left to right.
+    parts: Vec<Part>,
+}
+
+/// What is seen at some of a pixel's samples.
+struct Part {
+    column: u32,
+    /// Which part of the samples these are.
+    share: f32,
+    ray: Ray,
+    /// The points whose colours make it up; none where nothing is there.
+    points: Range<usize>,
+}
+
+impl Row {
+    fn clear(&mut self) {
+        self.batch.clear();
+        self.weights.clear();
+        self.parts.clear();
+    }
+}
+
+impl Part {
+    /// Its colour and opacity, by the weights and colours of all points.
+    fn color<C: ColorModel>(
+        &self,
+        shader: &Shader<'_, C>,
+        weights: &[f32],
+        colors: &[C::Sample],
+    ) -> (C::Sample, f32) {
+        if self.points.is_empty() {
+            return shader.background(&self.ray);
+        }
+        let mut sum = C::Sample::zero();
+        for point in self.points.clone() {
+            sum += colors[point] * weights[point];
+        }
+        (sum, 1.0)
+    }
+}
+
 impl<C: ColorModel> Picture<'_, C> {
     /// Some rows.
     fn band(&self, band: u32) -> Sums {
@@ -208,72 +257,88 @@ impl<C: ColorModel> Picture<'_, C> {
             height: ROWS.min(crop.height - top),
         };
         let mut sums = Sums::new(window, self.layout.clone()).expect("a band is small");
-        let kernel = self.scene.tracer().kernel();
         let mut columns = vec![[0.0; GROUP]; self.layout.count()];
-        let mut row = vec![0.0; self.layout.count()];
+        let mut values = vec![0.0; self.layout.count()];
+        let mut row = Row::default();
+        let mut colors = vec![Vec::new(); self.shaders.len()];
         for y in top..top + window.height {
-            for x in 0..crop.width {
-                for (pass, shader) in (0..).zip(&self.shaders) {
-                    self.pixel([x, y], (pass, shader), &mut row);
-                    self.layout.take(pass, row.iter(), 0, &mut columns);
+            self.look(y, &mut row);
+            for (shader, colors) in self.shaders.iter().zip(&mut colors) {
+                shader.shade(&row.batch, None, colors);
+            }
+            for parts in row.parts.chunk_by(|a, b| a.column == b.column) {
+                for (pass, (shader, colors)) in (0..).zip(self.shaders.iter().zip(&colors)) {
+                    let (mut sum, mut alpha) = (C::Sample::zero(), 0.0);
+                    for part in parts {
+                        let (color, opaque) = part.color(shader, &row.weights, colors);
+                        sum += color * part.share;
+                        alpha += opaque * part.share;
+                    }
+                    let color = self.scene.color();
+                    color.develop(pass, &sum, shader.wavelengths(), &mut values);
+                    if let Some(last) = values.last_mut() {
+                        *last = alpha;
+                    }
+                    self.layout.take(pass, &values, 0, &mut columns);
                 }
-                let group = Group {
-                    pixel: [crop.x + x, crop.y + y],
-                    count: 1,
-                    offsets: [[0.5; GROUP]; 2],
-                };
-                sums.splat(kernel, &self.film.filter, &group, &columns);
+                for (value, column) in values.iter_mut().zip(&columns) {
+                    *value = column[0];
+                }
+                sums.put([crop.x + parts[0].column, crop.y + y], &values);
             }
         }
         sums
     }
 
-    /// The values of a pixel: each triangle in it is shaded where the first of its samples lies, or in the pixel's centre where
-    /// all samples are its own.
-    fn pixel(&self, [x, y]: [u32; 2], (pass, shader): (u32, &Shader<'_, C>), row: &mut [f32]) {
-        let pixel = y as usize * self.film.crop.width as usize + x as usize;
+    /// What is seen in the pixels of a row: each triangle in one is shaded where the first of its samples lies, or in the pixel's
+    /// centre where all samples are its own.
+    fn look(&self, y: u32, row: &mut Row) {
+        row.clear();
+        let Window {
+            x: left,
+            y: top,
+            width,
+            ..
+        } = self.film.crop;
         let pattern = &self.raster.pattern;
         let count = pattern.count();
-        let mut numbers = [None; 16];
-        for (sample, number) in numbers.iter_mut().take(count).enumerate() {
-            *number = self.seen.number(pixel, sample);
-        }
-        let numbers = &numbers[..count];
-        let mut sum = C::Sample::zero();
-        let mut alpha = 0.0;
-        for (sample, number) in numbers.iter().enumerate() {
-            if numbers[..sample].contains(number) {
-                continue;
+        for x in 0..width {
+            let pixel = y as usize * width as usize + x as usize;
+            let mut numbers = [None; 16];
+            for (sample, number) in numbers.iter_mut().take(count).enumerate() {
+                *number = self.seen.number(pixel, sample);
             }
-            let share = numbers.iter().filter(|other| *other == number).count();
-            let [dx, dy] = match share == count {
-                true => [0.5; 2],
-                false => pattern.place(sample),
-            };
-            let Window {
-                x: left, y: top, ..
-            } = self.film.crop;
-            let place = DVec2::new(f64::from(left + x) + dx, f64::from(top + y) + dy);
-            let (color, opaque) = self.sample(shader, place, *number);
-            let weight = share as f32 / count as f32;
-            sum += color * weight;
-            alpha += opaque * weight;
-        }
-        let color = self.scene.color();
-        color.develop(pass, &sum, shader.wavelengths(), row);
-        if let Some(last) = row.last_mut() {
-            *last = alpha;
-        }
-    }
-
-    fn sample(&self, shader: &Shader<C>, place: DVec2, number: Option<u32>) -> (C::Sample, f32) {
-        let ray = self.ray(place);
-        match number {
-            None => shader.background(&ray),
-            Some(number) => {
-                let fragment = Fragment::new(&self.drawn, &self.projection, number, place);
-                let is_perspective = self.projection.is_perspective();
-                (shader.fragment(&ray, &fragment, is_perspective), 1.0)
+            let numbers = &numbers[..count];
+            for (sample, number) in numbers.iter().enumerate() {
+                if numbers[..sample].contains(number) {
+                    continue;
+                }
+                let samples = numbers.iter().filter(|other| *other == number).count();
+                let [dx, dy] = match samples == count {
+                    true => [0.5; 2],
+                    false => pattern.place(sample),
+                };
+                let place = DVec2::new(f64::from(left + x) + dx, f64::from(top + y) + dy);
+                let ray = self.ray(place);
+                let first = row.weights.len();
+                if let Some(number) = *number {
+                    let (drawn, projection) = (&self.drawn, &self.projection);
+                    let fragment = Fragment::new(drawn, projection, number, place);
+                    // All shaders want the same points.
+                    self.shaders[0].add_points(
+                        &mut row.batch,
+                        (drawn, projection),
+                        number,
+                        (&ray, &fragment),
+                        &mut row.weights,
+                    );
+                }
+                row.parts.push(Part {
+                    column: x,
+                    share: samples as f32 / count as f32,
+                    ray,
+                    points: first..row.weights.len(),
+                });
             }
         }
     }

@@ -76,7 +76,7 @@ struct Batch<'a, C: ColorModel> {
     /// Of the starts, in their order.
     groups: Vec<Group>,
     estimates: Estimates<C::Sample>,
-    /// A sample's colours.
+    /// A sample's values, a channel each.
     row: Vec<f32>,
     /// The groups' values, for each a row a channel.
     columns: Vec<[f32; GROUP]>,
@@ -121,8 +121,8 @@ impl<C: ColorModel> Batch<'_, C> {
     /// Adds what the estimates of a pass bring to the columns.
     fn develop(&mut self, pass: u32) {
         let (color, layout) = (self.job.scene.color(), &self.layout);
-        let (count, extra) = (layout.count(), layout.extra().len());
-        self.row.resize(layout.colors().len(), 0.0);
+        let (count, extra) = (layout.count(), layout.extra());
+        self.row.resize(count, 0.0);
         let mut index = 0;
         let weighted = !self.job.view.sensor.is_projective();
         for (number, group) in self.groups.iter().enumerate() {
@@ -130,14 +130,16 @@ impl<C: ColorModel> Batch<'_, C> {
             for sample in 0..group.count {
                 let Estimate { radiance, alpha } = &self.estimates.values[index];
                 let wavelengths = &self.starts[index].wavelengths;
-                color.develop(pass, radiance, wavelengths, &mut self.row);
+                let colors = &mut self.row[..extra.start];
+                color.develop(pass, radiance, wavelengths, colors);
                 if weighted {
                     let weight = weight(&self.job.view, group, sample);
-                    self.row.iter_mut().for_each(|value| *value *= weight);
+                    colors.iter_mut().for_each(|value| *value *= weight);
                 }
-                let extra = &self.estimates.extra[index * extra..][..extra];
-                let values = self.row.iter().chain(extra).chain([alpha]);
-                layout.take(pass, values, sample, columns);
+                let added = &self.estimates.extra[index * extra.len()..][..extra.len()];
+                self.row[extra.clone()].copy_from_slice(added);
+                self.row[extra.end] = *alpha;
+                layout.take(pass, &self.row, sample, columns);
                 index += 1;
             }
         }
@@ -146,11 +148,12 @@ impl<C: ColorModel> Batch<'_, C> {
     /// Gives the light of a pass that came to the film from lights to the sink.
     fn splat<S: Sink>(&mut self, pass: u32, sink: &mut S) {
         let place = Place::of(&self.job.view.film);
+        let colors = &mut self.row[self.layout.colors()];
         for splat in &self.estimates.splats {
             let wavelengths = &self.starts[splat.start as usize].wavelengths;
-            (self.job.scene.color()).develop(pass, &splat.value, wavelengths, &mut self.row);
-            self.row.iter_mut().for_each(|value| *value *= place.share);
-            sink.splat(place.on(splat.film), &self.row);
+            (self.job.scene.color()).develop(pass, &splat.value, wavelengths, colors);
+            colors.iter_mut().for_each(|value| *value *= place.share);
+            sink.splat(place.on(splat.film), colors);
         }
     }
 }

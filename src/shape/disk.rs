@@ -67,7 +67,7 @@ impl Disk {
             position: self.position(p),
             normal: self.normal,
             primitive: 0,
-            barycentric: Vec2::ZERO,
+            barycentric: p,
             pdf: 0.0,
         }
     }

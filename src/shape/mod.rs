@@ -66,7 +66,7 @@ pub struct SurfaceSample {
     pub normal: Vec3,
     /// The primitive.
     pub primitive: u32,
-    /// The second and third barycentric coordinate on a triangle.
+    /// The second and third barycentric coordinate on a triangle; on a disk its own x and y.
     pub barycentric: Vec2,
     /// Density per solid angle at the other point, in 1/sr.
     pub pdf: f32,

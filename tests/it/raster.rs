@@ -83,6 +83,19 @@ const NEEDS_MORE: [&str; 13] = [
     "stl",
 ];
 
+/// What a shape needs to be one.
+fn corners(shape: &str) -> &'static str {
+    match shape {
+        "polygon" => {
+            "<vector name='p0' value='-1,-1,0'/><vector name='p1' value='1,-1,0'/><vector name='p2' value='1.2,0.7,0'/><vector name='p3' value='0,0.2,0'/><vector name='p4' value='-0.8,1,0'/>"
+        }
+        "triangle" => {
+            "<vector name='p0' value='-1,-1,0'/><vector name='p1' value='1,-1,0'/><vector name='p2' value='0.3,1,0.4'/>"
+        }
+        _ => "",
+    }
+}
+
 #[test]
 fn every_shape_looks_the_same_to_rays_and_to_the_z_buffer() {
     let mut skipped = Vec::new();
@@ -90,15 +103,7 @@ fn every_shape_looks_the_same_to_rays_and_to_the_z_buffer() {
         if NEEDS_MORE.contains(&name) {
             continue;
         }
-        let inside = match name {
-            "polygon" => {
-                "<vector name='p0' value='-1,-1,0'/><vector name='p1' value='1,-1,0'/><vector name='p2' value='1.2,0.7,0'/><vector name='p3' value='0,0.2,0'/><vector name='p4' value='-0.8,1,0'/>"
-            }
-            "triangle" => {
-                "<vector name='p0' value='-1,-1,0'/><vector name='p1' value='1,-1,0'/><vector name='p2' value='0.3,1,0.4'/>"
-            }
-            _ => "",
-        };
+        let inside = corners(name);
         for sensor in ["perspective", "orthographic"] {
             for (stand, turn) in [
                 ("", ""),
@@ -153,6 +158,12 @@ fn lit(integrator: &str) -> String {
     ))
 }
 
+/// How far values are apart, on average.
+fn mean_difference(a: &Image, b: &Image) -> f32 {
+    let differences = a.data().iter().zip(b.data()).map(|(a, b)| (a - b).abs());
+    differences.sum::<f32>() / a.data().len() as f32
+}
+
 #[test]
 fn what_the_z_buffer_draws_is_what_the_integrator_phong_renders() {
     let [drawn, rendered] = ["raster", "phong"].map(|name| image_of(&lit(name), 0));
@@ -171,6 +182,31 @@ fn what_the_z_buffer_draws_is_what_the_integrator_phong_renders() {
     assert!(far * 10 < apart.len(), "{far} of {}", apart.len());
     let mean = apart.iter().sum::<f32>() / apart.len() as f32;
     assert!(mean < 0.02, "{mean}");
+}
+
+#[test]
+fn textures_lie_on_every_shape_where_rays_see_them() {
+    for (name, _) in shape::plugins() {
+        if NEEDS_MORE.contains(&name) {
+            continue;
+        }
+        let inside = corners(name);
+        let [drawn, rendered] = ["raster", "phong"].map(|integrator| {
+            let text = scene(&format!(
+                "<integrator type='{integrator}'><boolean name='shadows' value='false'/></integrator>
+                <sensor type='perspective'><transform name='to_world'><lookat origin='1,2.2,3.4' target='0,0,0.2' up='0,1,0'/></transform>
+                <film type='hdrfilm'><integer name='width' value='48'/><integer name='height' value='36'/><rfilter type='box'/></film>
+                <sampler type='stratified'><integer name='sample_count' value='16'/></sampler></sensor>
+                <emitter type='point'><point name='position' value='2,3,4'/></emitter>
+                <shape type='{name}'>{inside}<bsdf type='twosided'><bsdf type='diffuse'><texture name='reflectance' type='checkerboard'>
+                <transform name='to_uv'><scale x='2' y='2'/></transform></texture></bsdf></bsdf></shape>"
+            ));
+            image_of(&text, 0)
+        });
+        let brightest = rendered.data().iter().copied().fold(0.0, f32::max);
+        let mean = mean_difference(&drawn, &rendered) / brightest;
+        assert!(mean < 0.04, "{name}: {mean}");
+    }
 }
 
 #[test]
@@ -215,9 +251,7 @@ fn where_samples_come_one_by_one_rays_take_the_z_buffer_s_place() {
         "<integrator type='moment'><integrator type='raster'/></integrator>",
     );
     let [drawn, traced] = [&text, &nested].map(|text| image_of(text, 0));
-    let difference = |(a, b): (&f32, &f32)| (a - b).abs();
-    let sum: f32 = drawn.data().iter().zip(traced.data()).map(difference).sum();
-    let mean = sum / drawn.data().len() as f32;
+    let mean = mean_difference(&drawn, &traced);
     assert!(mean < 0.02, "{mean}");
 }
 
