@@ -7,9 +7,11 @@
 //! light brings, and of area lights the integral of L·cos θ·dA over what can be seen of them, one point of
 //! which is drawn. With `falloff` `none` (default) that is all; `inverse_square` divides by the squared
 //! distance. An environment brings the integral of L·dω. There is no π: against `path`, a matte surface is π
-//! times as bright. `shadows` (true) may be switched off; `max_depth`, `rr_depth` and
+//! times as bright, unless `falloff` is `radiometric`, which is `inverse_square` over π. `shadows` (true) may be switched off; `max_depth`, `rr_depth` and
 //! `hide_emitters` are those of `path`;
 //! `layers` takes the image apart, see [`super::layers`].
+
+use std::f32::consts::FRAC_1_PI;
 
 use super::arrival::Arrival;
 use super::bounce::Bounces;
@@ -41,9 +43,10 @@ pub struct Phong {
 enum Falloff {
     None,
     InverseSquare,
+    Radiometric,
 }
 
-const FALLOFFS: &[&str] = &["none", "inverse_square"];
+pub(super) const FALLOFFS: &[&str] = &["none", "inverse_square", "radiometric"];
 
 /// A light's terms, whose visibility is still to be asked.
 #[derive(Clone, Copy, Debug)]
@@ -123,6 +126,7 @@ impl Phong {
     pub(super) fn build(properties: &Properties<'_>, context: &Context) -> Result<Self> {
         let falloff = match properties.choice("falloff")? {
             "inverse_square" => Falloff::InverseSquare,
+            "radiometric" => Falloff::Radiometric,
             _ => Falloff::None,
         };
         Ok(Self {
@@ -253,6 +257,7 @@ impl<S: Spectral> Bounce<'_, '_, S> {
                 F::select(sample.distant, F::one(), squared)
             }
             Falloff::InverseSquare => F::one(),
+            Falloff::Radiometric => F::splat(FRAC_1_PI),
         };
         let intensity = block.throughput * sample.radiance * (squared / sample.pdf);
         let (diffuse, specular) = (intensity * terms.diffuse, intensity * terms.specular);

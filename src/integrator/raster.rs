@@ -11,6 +11,7 @@
 use glam::Vec3;
 
 use super::limits;
+use super::phong::FALLOFFS;
 use super::{Context, Cost, Estimate, Estimates, Estimator, Footprint, Start};
 use crate::color::{ColorModel, Spectral as _};
 use crate::description::Properties;
@@ -47,11 +48,7 @@ impl Raster {
                     &["phong", "gouraud"],
                     "where the equation is evaluated: for every fragment, or for corners of triangles",
                 ),
-                choice(
-                    "falloff",
-                    &["none", "inverse_square"],
-                    "how light weakens with distance",
-                ),
+                choice("falloff", FALLOFFS, "how light weakens with distance"),
                 boolean(
                     "shadows",
                     true,
@@ -113,6 +110,7 @@ impl Raster {
                 },
                 lighting: match properties.choice("falloff")? {
                     "inverse_square" => Lighting::InverseSquare,
+                    "radiometric" => Lighting::Radiometric,
                     _ => Lighting::Textbook,
                 },
                 shadows: properties.boolean("shadows")?.then_some(shadows),

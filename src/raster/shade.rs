@@ -382,6 +382,10 @@ impl<C: ColorModel> OfOneMaterial<'_, '_, C> {
                 false => C::Sample::zero(),
             });
         }
+        let unit = F::splat(match shader.settings.lighting {
+            Lighting::Radiometric => FRAC_1_PI,
+            Lighting::Textbook | Lighting::InverseSquare => 1.0,
+        });
         let lamps = if material.is_smooth() {
             &shader.lamps[..]
         } else {
@@ -395,7 +399,7 @@ impl<C: ColorModel> OfOneMaterial<'_, '_, C> {
                         let returned = self.returned(at, lanes::Vec3::all(*direction), w);
                         sum = sum + returned * C::Columns::<F>::from_samples(|_| *brought);
                     }
-                    lit = lit + sum;
+                    lit = lit + sum * unit;
                 }
                 Lamp::Single(id, map) => {
                     let light = &scene.lights()[id.index()];
@@ -414,16 +418,14 @@ impl<C: ColorModel> OfOneMaterial<'_, '_, C> {
                         }
                         _ => F::one(),
                     };
-                    let brought = sample.radiance * returned * (share * squared / sample.pdf);
+                    let strength = unit * (share * squared / sample.pdf);
+                    let brought = sample.radiance * returned * strength;
                     let seen = asked & F::zero().lt(share);
                     lit = lit + C::Columns::<F>::select(seen, brought, C::Columns::<F>::zero());
                 }
             }
         }
-        match shader.settings.lighting {
-            Lighting::Radiometric => lit * F::splat(FRAC_1_PI),
-            _ => lit,
-        }
+        lit
     }
 
     /// What the material returns of light from a direction, by Phong's equation.

@@ -120,13 +120,23 @@ impl Options {
     }
 }
 
+/// Integrators that know light as textbooks do. In place of another they know it as that does, or all would be far too bright.
+const TEXTBOOK: [&str; 2] = ["phong", "raster"];
+
 impl Overrides {
     /// Writes the values into `description`, so that they are checked as the file's own are.
     pub fn apply(&self, description: &mut Description) {
         let root = description.root().node_id();
         let integrator = description.child_or_new(root, Kind::Integrator, "path");
         if let Some(plugin) = &self.integrator {
+            let is_textbook = |plugin: &str| TEXTBOOK.contains(&plugin);
+            let becomes_textbook =
+                is_textbook(plugin) && !is_textbook(description.node(integrator).plugin());
             replace(description, integrator, plugin);
+            if becomes_textbook {
+                let falloff = Value::String("radiometric".into());
+                description.set(integrator, "falloff", falloff);
+            }
         }
         if let Some(depth) = self.max_depth {
             let innermost = innermost(description, integrator);

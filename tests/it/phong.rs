@@ -317,7 +317,11 @@ fn area_lights_bring_their_intensity_and_mirrors_show_what_they_show() {
         ))
     };
     for mirror in [false, true] {
-        for (falloff, expected) in [("none", 0.5), ("inverse_square", 0.5 / 81.0)] {
+        for (falloff, expected) in [
+            ("none", 0.5),
+            ("inverse_square", 0.5 / 81.0),
+            ("radiometric", 0.5 / 81.0 / std::f64::consts::PI),
+        ] {
             let value = Mean::of_channel(&image_of(&text(falloff, mirror), 1), 0).value;
             assert!(
                 (value / expected - 1.0).abs() < 0.01,

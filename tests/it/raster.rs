@@ -210,6 +210,29 @@ fn textures_lie_on_every_shape_where_rays_see_them() {
 }
 
 #[test]
+fn in_place_of_another_integrator_lights_are_as_bright_as_they_were() {
+    let text = scene(
+        "<integrator type='path'><integer name='max_depth' value='2'/></integrator>
+        <sensor type='perspective'><transform name='to_world'><lookat origin='0,3,4' target='0,0,0' up='0,1,0'/></transform>
+        <film type='hdrfilm'><integer name='width' value='24'/><integer name='height' value='18'/><rfilter type='box'/></film>
+        <sampler type='stratified'><integer name='sample_count' value='16'/></sampler></sensor>
+        <emitter type='point'><point name='position' value='0,3,0'/></emitter><shape type='sphere'/>",
+    );
+    let [path, phong, raster] = [None, Some("phong"), Some("raster")].map(|integrator| {
+        let overrides = Overrides {
+            integrator: integrator.map(str::to_owned),
+            ..Overrides::default()
+        };
+        rendered(&text, &overrides, &Options::default()).image
+    });
+    let brightest = path.data().iter().copied().fold(0.0, f32::max);
+    for image in [phong, raster] {
+        let mean = mean_difference(&path, &image) / brightest;
+        assert!(mean < 0.02, "{mean}");
+    }
+}
+
+#[test]
 fn what_is_drawn_depends_neither_on_threads_nor_on_the_crop() {
     let text = lit("raster");
     let with = |threads: usize, crop: Option<Window>| {
