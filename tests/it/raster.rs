@@ -67,7 +67,7 @@ fn rays_and_the_z_buffer_see_the_same_in_every_scene() {
 }
 
 /// The shapes that no table can make by itself: they need files, or are made of others.
-const NEEDS_MORE: [&str; 13] = [
+const NEEDS_MORE: [&str; 14] = [
     "bsplinecurve",
     "ellipsoids",
     "ellipsoidsmesh",
@@ -75,6 +75,7 @@ const NEEDS_MORE: [&str; 13] = [
     "group",
     "instance",
     "linearcurve",
+    "merge",
     "obj",
     "ply",
     "sdfgrid",
