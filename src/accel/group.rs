@@ -215,11 +215,15 @@ impl<'a> Members<'a> {
         }
     }
 
+    /// The runs, each with the number after its last item's.
+    fn runs(&self) -> impl Iterator<Item = (&Run, u32)> {
+        let ends = self.runs.iter().skip(1).map(|run| run.start);
+        self.runs.iter().zip(ends.chain([self.count]))
+    }
+
     /// A box around all items.
     fn union(&self) -> Bounds {
-        let ends = self.runs.iter().skip(1).map(|run| run.start);
-        let runs = self.runs.iter().zip(ends.chain([self.count]));
-        let boxes = runs.map(|(run, end)| match run.first.as_instance() {
+        let boxes = self.runs().map(|(run, end)| match run.first.as_instance() {
             // A mesh is one run.
             None if let Geometry::Mesh(mesh) = self.shapes.get(run.first.shape) => {
                 let bounds = mesh.mesh().bounds();
@@ -308,8 +312,7 @@ impl Leaves for Members<'_> {
     }
 
     fn digest(&self, hasher: &mut blake3::Hasher) {
-        let ends = self.runs.iter().skip(1).map(|run| run.start);
-        for (run, end) in self.runs.iter().zip(ends.chain([self.count])) {
+        for (run, end) in self.runs() {
             hasher.update(&(end - run.start).to_le_bytes());
             let shape = run.first.as_instance().is_none();
             let shape = shape.then(|| self.shapes.get(run.first.shape));

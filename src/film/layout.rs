@@ -4,8 +4,6 @@ use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
-use super::GROUP;
-
 /// Names of a sample's channels: red, green and blue, other colours of the colour model, what the integrator adds, and
 /// opacity.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -71,24 +69,21 @@ impl Layout {
         self.colors..self.opacity()
     }
 
-    /// Takes the values of a sample, a channel each, of a pass over the bands into its place in columns. Of light and colours
-    /// each pass brings a part, of other channels the first brings all.
-    pub(crate) fn take(
+    /// Takes the values of a sample, a channel each, of a pass over the bands into what all passes come to. Of light and
+    /// colours each pass brings a part, of other channels the first brings all.
+    pub(crate) fn take<'s>(
         &self,
         pass: u32,
         values: &[f32],
-        sample: usize,
-        columns: &mut [[f32; GROUP]],
+        sums: impl Iterator<Item = &'s mut f32>,
     ) {
         if pass == 0 {
-            for (column, value) in columns.iter_mut().zip(values) {
-                column[sample] = *value;
-            }
+            sums.zip(values).for_each(|(sum, value)| *sum = *value);
             return;
         }
-        for (channel, (column, value)) in columns.iter_mut().zip(values).enumerate() {
+        for (channel, (sum, value)) in sums.zip(values).enumerate() {
             if self.adds_up(channel) {
-                column[sample] += *value;
+                *sum += *value;
             }
         }
     }

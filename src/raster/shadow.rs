@@ -94,7 +94,7 @@ impl ShadowMap {
             let corners = bounds
                 .corners()
                 .map(|corner| projection.place(corner.as_dvec3()));
-            if projection.misses(&corners, &canvas.window) {
+            if projection.misses_all(&corners) {
                 continue;
             }
             faces.push(Face {

@@ -15,7 +15,7 @@ use super::unit;
 use crate::color::{ColorModel, Spectral as _};
 use crate::description::{Description, Kind};
 use crate::error::{Error, Problem, Result};
-use crate::film::{Accumulator as _, GROUP, Layout, Sums};
+use crate::film::{Accumulator as _, Layout, Sums};
 use crate::filter::Filter;
 use crate::image::Image;
 use crate::integrator::Raster;
@@ -257,8 +257,7 @@ impl<C: ColorModel> Picture<'_, C> {
             height: ROWS.min(crop.height - top),
         };
         let mut sums = Sums::new(window, self.layout.clone()).expect("a band is small");
-        let mut columns = vec![[0.0; GROUP]; self.layout.count()];
-        let mut values = vec![0.0; self.layout.count()];
+        let [mut values, mut pixel] = [(); 2].map(|()| vec![0.0; self.layout.count()]);
         let mut row = Row::default();
         let mut colors = vec![Vec::new(); self.shaders.len()];
         for y in top..top + window.height {
@@ -279,12 +278,9 @@ impl<C: ColorModel> Picture<'_, C> {
                     if let Some(last) = values.last_mut() {
                         *last = alpha;
                     }
-                    self.layout.take(pass, &values, 0, &mut columns);
+                    self.layout.take(pass, &values, pixel.iter_mut());
                 }
-                for (value, column) in values.iter_mut().zip(&columns) {
-                    *value = column[0];
-                }
-                sums.put([crop.x + parts[0].column, crop.y + y], &values);
+                sums.put([crop.x + parts[0].column, crop.y + y], &pixel);
             }
         }
         sums

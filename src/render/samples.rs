@@ -139,7 +139,8 @@ impl<C: ColorModel> Batch<'_, C> {
                 let added = &self.estimates.extra[index * extra.len()..][..extra.len()];
                 self.row[extra.clone()].copy_from_slice(added);
                 self.row[extra.end] = *alpha;
-                layout.take(pass, &self.row, sample, columns);
+                let sums = columns.iter_mut().map(|column| &mut column[sample]);
+                layout.take(pass, &self.row, sums);
                 index += 1;
             }
         }
