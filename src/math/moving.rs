@@ -41,9 +41,32 @@ enum Link {
 struct Track {
     /// Strictly increasing; two at least.
     times: Vec<f64>,
-    poses: Vec<Pose>,
-    /// From each pose to the next.
-    arcs: Vec<Turn>,
+    /// From each keyframe to the next.
+    segments: Vec<Segment>,
+}
+
+/// From a keyframe to the next. Of each pair of values the first is at the beginning, and the second is what is added up
+/// to the end.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Segment {
+    turn: Turn,
+    scale: [DVec3; 2],
+    /// The inverse of the scale, where that stays.
+    shrink: Option<DVec3>,
+    translation: [DVec3; 2],
+    /// When it begins, and one over the time that it takes.
+    start: f64,
+    rate: f64,
+}
+
+/// Parts of a transform at a time.
+#[derive(Clone, Copy, Debug)]
+struct Placed {
+    /// The inverse rotation, which is the transpose.
+    unturned: DMat3,
+    scale: DVec3,
+    shrink: DVec3,
+    translation: DVec3,
 }
 
 /// A transform that neither shears nor flattens, in parts: x ↦ rotation·(scale·x) + translation.
@@ -55,13 +78,15 @@ pub struct Pose {
     translation: DVec3,
 }
 
-/// The shorter arc from one rotation q to another: q·cos(s·angle) + `side`·sin(s·angle) for s in [0, 1].
+/// The shorter arc from one rotation to another. With m half way and n at right angles to it, of unit length, quaternions on
+/// it are m·cos(x/2) + n·sin(x/2). A rotation's matrix R(q) is quadratic in q, with a bilinear form B: so it is
+/// (R(m) + R(n))/2 + (R(m) − R(n))/2·cos x + B(m, n)·sin x, and a ray pays for no quaternion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Turn {
-    /// At right angles to q, of unit length, as vectors of four.
-    side: DQuat,
-    /// Between the quaternions in radians, which is half of that by which space turns; in [0, π/2].
-    angle: f64,
+    /// The inverse rotation: what stays, and what goes with the cosine and with the sine.
+    parts: [DMat3; 3],
+    /// Half of that by which space turns, in radians: x goes from -`half` to `half`, which is in [0, π/2].
+    half: f64,
 }
 
 /// Why keyframes make no motion. Keyframes are counted from 0.
@@ -139,21 +164,53 @@ impl Pose {
     pub fn is_half_a_turn_from(&self, other: &Self) -> bool {
         self.rotation.dot(other.rotation).abs() < HALF_TURN
     }
+}
 
-    fn forward(&self) -> DAffine3 {
-        DAffine3::from_scale_rotation_translation(self.scale, self.rotation, self.translation)
-    }
+/// The bilinear form of which R(q) = B(q, q) is the matrix of a rotation.
+fn rotation(a: DQuat, b: DQuat) -> DMat3 {
+    let (a, b) = (a.to_array(), b.to_array());
+    let product = |i: usize, j: usize| a[i] * b[j] + a[j] * b[i];
+    let [x, y, z, w] = [0, 1, 2, 3].map(|i| a[i] * b[i]);
+    let [xy, yz, zx] = [(0, 1), (1, 2), (2, 0)].map(|(i, j)| product(i, j));
+    let [wx, wy, wz] = [0, 1, 2].map(|i| product(3, i));
+    DMat3::from_cols(
+        DVec3::new(w + x - y - z, xy + wz, zx - wy),
+        DVec3::new(xy - wz, w - x + y - z, yz + wx),
+        DVec3::new(zx + wy, yz - wx, w - x - y + z),
+    )
+}
 
-    /// The way back, without inverting a matrix.
-    fn inverse(&self) -> DAffine3 {
-        let turned = DMat3::from_quat(self.rotation).transpose();
-        let r = self.scale.recip();
-        let matrix3 = DMat3::from_cols(turned.x_axis * r, turned.y_axis * r, turned.z_axis * r);
-        DAffine3 {
-            matrix3,
-            translation: -(matrix3 * self.translation),
-        }
+/// The series of the cosine in x², up to x¹⁸.
+const COSINE: [f64; 10] = series(0.0);
+/// The series of the sine over x in x², up to x¹⁹.
+const SINE: [f64; 10] = series(1.0);
+
+const fn series(shift: f64) -> [f64; 10] {
+    let mut series = [1.0; 10];
+    let mut i = 1;
+    while i < 10 {
+        let n = (2 * i) as f64 + shift;
+        series[i] = -series[i - 1] / ((n - 1.0) * n);
+        i += 1;
     }
+    series
+}
+
+/// The sum of a series, in parts that do not wait for each other.
+#[inline(always)]
+fn sum(c: &[f64; 10], y: f64) -> f64 {
+    let y2 = y * y;
+    let y4 = y2 * y2;
+    let first = (c[0] + c[1] * y) + (c[2] + c[3] * y) * y2;
+    let next = (c[4] + c[5] * y) + (c[6] + c[7] * y) * y2;
+    first + (next + (c[8] + c[9] * y) * y4) * y4
+}
+
+/// Cosine and sine of x in [-π/2, π/2], to within 10⁻¹⁴: the same bits on every machine, and sooner than from its library.
+#[inline(always)]
+fn cos_sin(x: f64) -> [f64; 2] {
+    let y = x * x;
+    [sum(&COSINE, y), sum(&SINE, y) * x]
 }
 
 impl Turn {
@@ -166,15 +223,94 @@ impl Turn {
         };
         let side = to - from * cosine;
         let sine = side.length();
-        if sine < f64::EPSILON {
-            return Self {
-                side: DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0),
-                angle: 0.0,
-            };
-        }
+        // Between the quaternions, which is half of that by which space turns.
+        let (side, half) = match sine < f64::EPSILON {
+            true => (DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0), 0.0),
+            false => (side / sine, sine.atan2(cosine)),
+        };
+        let (sin, cos) = (0.5 * half).sin_cos();
+        let (m, n) = (from * cos + side * sin, side * cos - from * sin);
+        let (of_m, of_n) = (rotation(m, m), rotation(n, n));
+        let parts = [(of_m + of_n) * 0.5, (of_m - of_n) * 0.5, rotation(m, n)];
         Self {
-            side: side / sine,
-            angle: sine.atan2(cosine),
+            parts: parts.map(|part| part.transpose()),
+            half,
+        }
+    }
+
+    /// The inverse rotation a part s of the way along.
+    #[inline(always)]
+    fn back(&self, s: f64) -> DMat3 {
+        let [cos, sin] = cos_sin(self.half * (2.0 * s - 1.0));
+        let [stays, along, across] = &self.parts;
+        DMat3::from_cols(
+            stays.x_axis + along.x_axis * cos + across.x_axis * sin,
+            stays.y_axis + along.y_axis * cos + across.y_axis * sin,
+            stays.z_axis + along.z_axis * cos + across.z_axis * sin,
+        )
+    }
+}
+
+impl Segment {
+    fn between([from, to]: [&Pose; 2], times: [f64; 2]) -> Self {
+        let scale = [from.scale, to.scale - from.scale];
+        Self {
+            turn: Turn::between(from.rotation, to.rotation),
+            scale,
+            shrink: (scale[1] == DVec3::ZERO).then(|| from.scale.recip()),
+            translation: [from.translation, to.translation - from.translation],
+            start: times[0],
+            rate: (times[1] - times[0]).recip(),
+        }
+    }
+
+    /// Of each axis the largest absolute value on the way.
+    fn largest_scale(&self) -> DVec3 {
+        let [from, growth] = self.scale;
+        from.abs().max((from + growth).abs())
+    }
+
+    /// Of each axis the largest absolute value of the translation on the way.
+    fn farthest(&self) -> DVec3 {
+        let [from, course] = self.translation;
+        from.abs().max((from + course).abs())
+    }
+
+    /// A part s of the way along.
+    #[inline(always)]
+    fn placed(&self, s: f64) -> Placed {
+        let scale = self.scale[0] + self.scale[1] * s;
+        Placed {
+            unturned: self.turn.back(s),
+            scale,
+            shrink: self.shrink.unwrap_or_else(|| scale.recip()),
+            translation: self.translation[0] + self.translation[1] * s,
+        }
+    }
+}
+
+impl Placed {
+    fn forward(&self) -> DAffine3 {
+        let turned = self.unturned.transpose();
+        let (s, translation) = (self.scale, self.translation);
+        DAffine3 {
+            matrix3: DMat3::from_cols(
+                turned.x_axis * s.x,
+                turned.y_axis * s.y,
+                turned.z_axis * s.z,
+            ),
+            translation,
+        }
+    }
+
+    /// The way back, without inverting a matrix.
+    #[inline(always)]
+    fn inverse(&self) -> DAffine3 {
+        let (m, r) = (&self.unturned, self.shrink);
+        let matrix3 = DMat3::from_cols(m.x_axis * r, m.y_axis * r, m.z_axis * r);
+        DAffine3 {
+            matrix3,
+            translation: -(matrix3 * self.translation),
         }
     }
 }
@@ -201,41 +337,34 @@ impl Track {
             times.push(*time);
             poses.push(pose);
         }
-        let arcs = poses
-            .windows(2)
-            .map(|p| Turn::between(p[0].rotation, p[1].rotation));
+        let pairs = poses.windows(2).zip(times.windows(2));
+        let segments =
+            pairs.map(|(pose, time)| Segment::between([&pose[0], &pose[1]], [time[0], time[1]]));
         Ok(Self {
-            arcs: arcs.collect(),
+            segments: segments.collect(),
             times,
-            poses,
         })
     }
 
-    /// The keyframe before `time`, and the part of the way to the next, in [0, 1].
-    #[inline]
+    /// The segment in which `time` lies, and the part of it that has passed, in [0, 1].
+    #[inline(always)]
     fn place(&self, time: f64) -> (usize, f64) {
-        let last = self.times.len() - 1;
-        let after = self.times.partition_point(|t| *t <= time);
-        match after {
-            0 => (0, 0.0),
-            _ if after > last => (last - 1, 1.0),
-            _ => {
-                let [from, to] = [self.times[after - 1], self.times[after]];
-                (after - 1, (time - from) / (to - from))
-            }
-        }
+        let key = self.segments[1..].partition_point(|next| next.start <= time);
+        let Segment { start, rate, .. } = self.segments[key];
+        let s = (time - start) * rate;
+        // What is no number, between times that are next to each other, becomes 0.
+        (key, if s > 0.0 { s.min(1.0) } else { 0.0 })
     }
 
-    #[inline]
-    fn pose(&self, (key, s): (usize, f64)) -> Pose {
-        let [from, to] = [&self.poses[key], &self.poses[key + 1]];
-        let Turn { side, angle } = self.arcs[key];
-        let (sin, cos) = (s * angle).sin_cos();
-        Pose {
-            scale: from.scale + (to.scale - from.scale) * s,
-            rotation: from.rotation * cos + side * sin,
-            translation: from.translation + (to.translation - from.translation) * s,
-        }
+    #[inline(always)]
+    fn placed(&self, (key, s): (usize, f64)) -> Placed {
+        self.segments[key].placed(s)
+    }
+
+    /// The way back at a time.
+    #[inline(always)]
+    fn back(&self, time: f64) -> DAffine3 {
+        self.placed(self.place(time)).inverse()
     }
 
     /// A box around a box's image at all times of an interval. Between two times that are a part h of an arc apart, a
@@ -243,20 +372,20 @@ impl Track {
     fn swept(&self, [min, max]: [DVec3; 2], (open, close): (f64, f64)) -> [DVec3; 2] {
         let farthest = min.abs().max(max.abs());
         let [first, last] = [open, close].map(|time| self.place(time));
-        let mut swept = image(&self.pose(first).forward(), [min, max]);
+        let mut swept = image(&self.placed(first).forward(), [min, max]);
         for key in first.0..=last.0 {
             let from = if key == first.0 { first.1 } else { 0.0 };
             let to = if key == last.0 { last.1 } else { 1.0 };
-            let speed = 2.0 * self.arcs[key].angle;
+            let segment = &self.segments[key];
+            let speed = 2.0 * segment.turn.half;
             let steps = (speed * (to - from) / STEP).ceil().max(1.0);
             let h = (to - from) / steps;
-            let [a, b] = [&self.poses[key], &self.poses[key + 1]];
-            let reach = (a.scale.abs().max(b.scale.abs()) * farthest).length();
-            let growth = ((b.scale - a.scale).abs() * farthest).length();
+            let reach = (segment.largest_scale() * farthest).length();
+            let growth = (segment.scale[1].abs() * farthest).length();
             let bulge = h * h / 8.0 * (speed * speed * reach + 2.0 * speed * growth);
             for step in 0..=steps as u32 {
                 let s = (from + h * f64::from(step)).min(1.0);
-                let [low, high] = image(&self.pose((key, s)).forward(), [min, max]);
+                let [low, high] = image(&segment.placed(s).forward(), [min, max]);
                 swept = [swept[0].min(low - bulge), swept[1].max(high + bulge)];
             }
         }
@@ -283,8 +412,8 @@ impl Chain {
         let mut links = self.links.iter().map(|link| match link {
             Link::Fixed { forward, inverse } => (*forward, *inverse),
             Link::Track(track) => {
-                let pose = track.pose(track.place(time));
-                (pose.forward(), pose.inverse())
+                let placed = track.placed(track.place(time));
+                (placed.forward(), placed.inverse())
             }
         });
         let outermost = links
@@ -297,14 +426,21 @@ impl Chain {
     }
 
     /// [`Moving::back`].
+    #[inline(never)]
     fn back(&self, time: f32) -> Affine3 {
         let time = f64::from(time);
-        let inverses = self.links.iter().map(|link| match link {
-            Link::Fixed { inverse, .. } => *inverse,
-            Link::Track(track) => track.pose(track.place(time)).inverse(),
-        });
-        let back = inverses.reduce(|outer, inner| inner * outer);
-        back.unwrap_or(DAffine3::IDENTITY).as_affine3()
+        let back = match &self.links[..] {
+            [Link::Track(track)] => track.back(time),
+            links => {
+                let inverses = links.iter().map(|link| match link {
+                    Link::Fixed { inverse, .. } => *inverse,
+                    Link::Track(track) => track.back(time),
+                });
+                let back = inverses.reduce(|outer, inner| inner * outer);
+                back.unwrap_or(DAffine3::IDENTITY)
+            }
+        };
+        back.as_affine3()
     }
 }
 
@@ -421,14 +557,15 @@ impl Moving {
                             image(forward, bounds)
                         }
                         Link::Track(track) => {
-                            let largest = |of: fn(&Pose) -> DVec3| {
-                                track.poses.iter().map(of).fold(DVec3::ZERO, DVec3::max)
+                            let largest = |of: fn(&Segment) -> DVec3| {
+                                let segments = track.segments.iter().map(of);
+                                segments.fold(DVec3::ZERO, DVec3::max)
                             };
-                            let scale = largest(|pose| pose.scale.abs()).max_element();
+                            let scale = largest(Segment::largest_scale).max_element();
                             let spread = DVec3::splat(scale * 3.0_f64.sqrt());
                             let farthest = bounds[0].abs().max(bounds[1].abs());
                             let turned = (room + ROUNDING * farthest).length();
-                            let moved = largest(|pose| pose.translation.abs());
+                            let moved = largest(Segment::farthest);
                             room = spread * turned + ROUNDING * moved;
                             track.swept(bounds, interval)
                         }
