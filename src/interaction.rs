@@ -64,6 +64,7 @@ impl Hit {
     pub const NONE: u32 = u32::MAX;
 
     /// A miss of a ray that ends at `t_max`.
+    #[inline]
     pub fn miss(t_max: f32) -> Self {
         Self {
             t: t_max,
@@ -76,6 +77,7 @@ impl Hit {
     }
 
     /// Whether nothing was hit.
+    #[inline]
     pub fn is_miss(&self) -> bool {
         self.shape == Self::NONE
     }

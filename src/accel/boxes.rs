@@ -27,7 +27,7 @@ pub(super) const SMALLEST: f32 = 1e-20;
 pub(super) const LOST: f32 = 2.0 * f32::EPSILON;
 
 impl RayBoxes {
-    #[inline]
+    #[inline(always)]
     pub(super) fn new(ray: &Ray) -> Self {
         let bounded = |d: f32| {
             if d.abs() < SMALLEST {
@@ -48,7 +48,7 @@ impl RayBoxes {
     }
 
     /// Where the ray enters the box, 0 from inside; `None` where it passes by, or enters after `limit`.
-    #[inline]
+    #[inline(always)]
     pub(super) fn entry(&self, bounds: &Bounds, limit: f32) -> Option<f32> {
         let backward = self.inverse.cmplt(Vec3::ZERO);
         let first = Vec3::select(backward, bounds.max, bounds.min);

@@ -376,6 +376,15 @@ impl Leaves for Halfway<'_> {
     }
 }
 
+/// The trees of a mesh that deforms.
+#[derive(Debug)]
+struct Deforming {
+    /// When its sets of vertices are.
+    times: Vec<f32>,
+    /// For the way from each set to the next.
+    trees: Vec<Tree>,
+}
+
 /// See the module.
 #[derive(Debug)]
 pub(super) struct Group {
@@ -384,8 +393,8 @@ pub(super) struct Group {
     items: Vec<Item>,
     has_instances: bool,
     tree: Tree,
-    /// The mesh that deforms, if it is one, with a tree for the way from each set of vertices to the next.
-    deforming: Option<(u32, Vec<Tree>)>,
+    /// Of a mesh that deforms.
+    deforming: Option<Deforming>,
     bounds: Bounds,
     /// Boxes that together hold what the tree holds; the world has none.
     parts: Vec<Bounds>,
@@ -451,8 +460,27 @@ impl Group {
             used.add(more);
             tree.fitted(&|number| mesh.ends(number - first, segment))
         });
-        group.deforming = Some((shape, trees.collect()));
+        group.deforming = Some(Deforming {
+            trees: trees.collect(),
+            times: mesh.times().to_vec(),
+        });
         Some((group, used))
+    }
+
+    /// The instance that is all there is in it, if that is so.
+    pub(super) fn lone_instance(&self) -> Option<u32> {
+        let [item] = &self.items[..] else { return None };
+        let alone = self.unbounded.is_empty() && self.tree.holds_no_triangle();
+        item.as_instance().filter(|_| alone)
+    }
+
+    /// Its tree, where it is the same at all times or at least of one way.
+    pub(super) fn only_tree(&self) -> Option<&Tree> {
+        match &self.deforming {
+            None => Some(&self.tree),
+            Some(Deforming { trees, .. }) if let [tree] = &trees[..] => Some(tree),
+            Some(_) => None,
+        }
     }
 
     /// Whether its tree moves.
@@ -462,19 +490,19 @@ impl Group {
 
     /// The tree at a time, and how far it has come on its way.
     #[inline]
-    pub(super) fn tree_at(&self, shapes: &Shapes, time: f32) -> (&Tree, f32) {
-        if let Some((shape, trees)) = &self.deforming
-            && let Geometry::Deforming(mesh) = shapes.get(*shape)
-        {
-            let moment = mesh.moment(time);
-            return (&trees[moment.segment], moment.part);
+    pub(super) fn tree_at(&self, time: f32) -> (&Tree, f32) {
+        match &self.deforming {
+            None => (&self.tree, 0.0),
+            Some(Deforming { times, trees }) => {
+                let moment = Moment::of(times, time);
+                (&trees[moment.segment], moment.part)
+            }
         }
-        (&self.tree, 0.0)
     }
 
     /// Nodes on the longest way down.
     pub(super) fn levels(&self) -> usize {
-        let moving = self.deforming.iter().flat_map(|(_, trees)| trees);
+        let moving = self.deforming.iter().flat_map(|d| &d.trees);
         moving
             .map(Tree::levels)
             .fold(self.tree.levels(), usize::max)
@@ -520,7 +548,7 @@ impl Group {
             + self
                 .deforming
                 .iter()
-                .flat_map(|(_, trees)| trees)
+                .flat_map(|d| &d.trees)
                 .map(Tree::bytes)
                 .sum::<usize>()
     }

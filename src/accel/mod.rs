@@ -193,6 +193,8 @@ pub struct Tracer {
     /// Each instance's box in the world, for all times of rays.
     instance_bounds: Vec<Bounds>,
     groups: Vec<Group>,
+    /// The instance that is all there is in the world, if that is so and one tree holds what stands in it.
+    alone: Option<u32>,
     /// Of the deepest tree of an instance.
     inner_levels: usize,
     /// Whether any tree moves.
@@ -246,7 +248,12 @@ impl Tracer {
         let world = group(&shapes_of[0], Some(&instance_bounds));
         groups.insert(0, world);
         let inner = groups[1..].iter().map(Group::levels);
+        let alone = groups[0].lone_instance().filter(|instance| {
+            let group = instances[*instance as usize].group;
+            groups[group as usize].only_tree().is_some()
+        });
         Self {
+            alone,
             shapes,
             group_of: group_of.to_vec(),
             instances,

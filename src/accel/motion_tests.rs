@@ -95,6 +95,8 @@ fn what_moves_is_met_alike_by_every_kernel_and_by_brute_force() {
         }];
         let blade = [shapes[4].clone()];
         assert!(agree(&all(&blade, &[1], &alone), &rays(310 + i, 5000)) > 200);
+        let both = &shapes[2..4];
+        assert!(agree(&all(both, &[1, 1], &alone), &rays(315 + i, 5000)) > 200);
     }
 }
 
@@ -183,8 +185,11 @@ fn a_point_is_found_again_at_other_times() {
     assert_eq!(Vec3::ZERO, Moving::IDENTITY.at(3.0).point(Vec3::ZERO));
 }
 
-/// A ball that swells, leans and is carried on, with its vertices at three times.
-fn deforming(seed: u64) -> Arc<Geometry> {
+/// In the shutter of the rays, which begins before and ends with them.
+const TIMES: [f32; 3] = [0.1, 0.4, 1.0];
+
+/// A ball that swells, leans and is carried on, with its vertices at these times.
+fn deforming(seed: u64, times: &[f32]) -> Arc<Geometry> {
     let at = |time: f32| {
         let mut mesh = mesh::bumpy_sphere(3, seed);
         for (i, position) in (0..).zip(&mut mesh.positions) {
@@ -195,7 +200,7 @@ fn deforming(seed: u64) -> Arc<Geometry> {
         mesh.compute_normals();
         TriangleMesh::new(mesh)
     };
-    let times = vec![0.1, 0.4, 1.0];
+    let times = times.to_vec();
     let meshes = times.iter().map(|time| at(*time)).collect();
     Arc::new(Geometry::Deforming(
         DeformingMesh::new(meshes, times).unwrap(),
@@ -206,7 +211,7 @@ fn deforming(seed: u64) -> Arc<Geometry> {
 fn what_deforms_is_met_alike_by_every_kernel_and_by_brute_force() {
     let (mut shapes, mut groups, mut instances) = parts();
     for (number, to_world) in [(5, Moving::IDENTITY), (6, motions().remove(1))] {
-        shapes.push(deforming(number.into()));
+        shapes.push(deforming(number.into(), &TIMES));
         groups.push(number);
         instances.push(Instance {
             to_world,
@@ -220,11 +225,13 @@ fn what_deforms_is_met_alike_by_every_kernel_and_by_brute_force() {
         group: 1,
     }];
     assert!(agree(&all(&shapes[7..8], &[1], &alone), &rays(360, 20_000)) > 3000);
+    let two = [deforming(7, &[0.2, 0.9])];
+    assert!(agree(&all(&two, &[1], &alone), &rays(365, 20_000)) > 3000);
 }
 
 #[test]
 fn what_deforms_is_at_its_times_what_the_meshes_are() {
-    let geometry = deforming(3);
+    let geometry = deforming(3, &TIMES);
     let Geometry::Deforming(mesh) = &*geometry else {
         panic!("it deforms")
     };

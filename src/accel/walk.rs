@@ -7,9 +7,9 @@ use crate::interaction::{Hit, Ray};
 use crate::shape::{Bounds, Geometry};
 
 use super::boxes::RayBoxes;
-use super::group::Item;
+use super::group::{Group, Item};
 use super::triangle::Shear;
-use super::wide::{Best, Met, Needs, Place, Start, Visit, Walker};
+use super::wide::{Best, Met, Needs, Place, Start, Tree, Visit, Walker};
 use super::{Counts, Instance, Method, Order, Tracer, to_local};
 
 /// See the module.
@@ -70,13 +70,20 @@ impl<'t> Walk<'t> {
             return self.items::<_, ANY>(way, group.items(), rays, ledger);
         }
         let mut counts = Counts::default();
+        let door = tracer.alone.filter(|_| way.instance == Hit::NONE);
+        let door = door.and_then(|instance| Door::of(tracer, instance));
+        let (way, tree) = match &door {
+            Some(door) => (door.way, door.tree),
+            None => (way, group.tree()),
+        };
         let mut party = Party::<_, ANY> {
             walk: self,
             way,
+            door,
             rays,
             ledger,
         };
-        let (tree, kernel, count) = (group.tree(), tracer.kernel, rays.len());
+        let (kernel, count) = (tracer.kernel, rays.len());
         if order == Order::Coherent && !group.has_instances() {
             tree.packets::<_, ANY>(kernel, &mut party, rays, &mut counts);
             return self.counts.add(&counts);
@@ -242,10 +249,63 @@ impl Ledger for Shadows<'_> {
     }
 }
 
+/// The way into the instance that is all there is in the world: rays begin in its tree, those that miss its box end there.
+#[derive(Clone, Copy, Debug)]
+struct Door<'t> {
+    way: Way,
+    instance: &'t Instance,
+    bounds: &'t Bounds,
+    group: &'t Group,
+    tree: &'t Tree,
+}
+
+impl<'t> Door<'t> {
+    fn of(tracer: &'t Tracer, index: u32) -> Option<Self> {
+        let instance = &tracer.instances[index as usize];
+        let group = &tracer.groups[instance.group as usize];
+        Some(Self {
+            way: Way {
+                group: instance.group,
+                instance: index,
+                entry: 0.0,
+            },
+            instance,
+            bounds: &tracer.instance_bounds[index as usize],
+            group,
+            tree: group.only_tree()?,
+        })
+    }
+
+    /// As the walk through the world's tree would come to it.
+    #[inline(always)]
+    fn start(&self, ray: &Ray, best: Best) -> Start {
+        let entry = RayBoxes::new(ray).entry(self.bounds, best.t);
+        let mut start = Start {
+            ray: *ray,
+            instance: self.way.instance,
+            entry: 0.0,
+            part: 0.0,
+            best,
+        };
+        match entry.filter(|_| is_sound(ray)) {
+            Some(entry) => {
+                start.ray = to_local(&self.instance.to_world, ray);
+                start.entry = entry;
+                (_, start.part) = self.group.tree_at(ray.time);
+            }
+            None => start.best.t = f32::NEG_INFINITY,
+        }
+        start
+    }
+}
+
 /// Rays that walk one group's tree together.
 struct Party<'w, 't, 'r, L: ?Sized, const ANY: bool> {
     walk: &'w mut Walk<'t>,
+    /// Of the tree in which they begin.
     way: Way,
+    /// If that is not where they are.
+    door: Option<Door<'t>>,
     rays: &'r [Ray],
     ledger: &'r mut L,
 }
@@ -303,7 +363,7 @@ impl<'t, L: Ledger + ?Sized, const ANY: bool> Party<'_, 't, '_, L, ANY> {
     #[inline(always)]
     fn way_by(&self, instance: u32, entry: f32) -> Way {
         if instance == self.way.instance {
-            return self.way;
+            return Way { entry, ..self.way };
         }
         Way {
             group: self.walk.tracer.instances[instance as usize].group,
@@ -317,18 +377,18 @@ impl<'t, L: Ledger + ?Sized, const ANY: bool> Party<'_, 't, '_, L, ANY> {
     fn instance(&self, visit: &Visit, instance: u32) -> Met<'t> {
         let tracer = self.walk.tracer;
         let Instance { to_world, group } = &tracer.instances[instance as usize];
-        let best = if visit.best.is_inside() {
+        let best = match visit.best.place {
+            Place::NOWHERE => visit.best,
+            Place::OUTSIDE => self.best(&self.ledger.hit(visit.ray), instance),
             // A triangle of the world, which comes after those of all instances.
-            Best {
+            _ => Best {
                 id: u32::MAX,
                 place: Place::OUTSIDE,
                 ..visit.best
-            }
-        } else {
-            self.best(&self.ledger.hit(visit.ray), instance)
+            },
         };
         let ray = &self.rays[visit.ray];
-        let (tree, part) = tracer.groups[*group as usize].tree_at(&tracer.shapes, ray.time);
+        let (tree, part) = tracer.groups[*group as usize].tree_at(ray.time);
         let start = Start {
             ray: to_local(to_world, ray),
             instance,
@@ -342,7 +402,7 @@ impl<'t, L: Ledger + ?Sized, const ANY: bool> Party<'_, 't, '_, L, ANY> {
     /// Meets a primitive that is no triangle.
     #[inline(never)]
     fn primitive(&mut self, visit: &Visit, way: Way, item: &Item) -> Met<'t> {
-        let from = if visit.instance == self.way.instance {
+        let from = if visit.instance == self.way.instance && self.door.is_none() {
             self.rays[visit.ray]
         } else {
             let Instance { to_world, .. } = &self.walk.tracer.instances[visit.instance as usize];
@@ -361,12 +421,17 @@ impl<'t, L: Ledger + ?Sized, const ANY: bool> Party<'_, 't, '_, L, ANY> {
 impl<'t, L: Ledger + ?Sized, const ANY: bool> Walker<'t> for Party<'_, 't, '_, L, ANY> {
     #[inline(always)]
     fn start(&self, ray: usize) -> Start {
+        let best = self.best(&self.ledger.hit(ray), self.way.instance);
+        let ray = &self.rays[ray];
+        if let Some(door) = &self.door {
+            return door.start(ray, best);
+        }
         Start {
-            ray: self.rays[ray],
+            ray: *ray,
             instance: self.way.instance,
             entry: self.way.entry,
             part: 0.0,
-            best: self.best(&self.ledger.hit(ray), self.way.instance),
+            best,
         }
     }
 

@@ -37,6 +37,18 @@ pub struct Moment {
     pub part: f32,
 }
 
+impl Moment {
+    /// Where `time` lies between those of the sets.
+    #[inline]
+    pub fn of(times: &[f32], time: f32) -> Self {
+        let inner = &times[1..times.len() - 1];
+        let segment = inner.partition_point(|t| *t <= time);
+        let [from, to] = [times[segment], times[segment + 1]];
+        let part = ((time - from) / (to - from)).clamp(0.0, 1.0);
+        Self { segment, part }
+    }
+}
+
 /// What keeps meshes from being one mesh at several times.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mismatch {
@@ -120,12 +132,12 @@ impl DeformingMesh {
     /// Where `time` lies between sets of vertices.
     #[inline]
     pub fn moment(&self, time: f32) -> Moment {
-        let last = self.segments() - 1;
-        let after = self.times.partition_point(|t| *t <= time);
-        let segment = after.saturating_sub(1).min(last);
-        let [from, to] = [self.times[segment], self.times[segment + 1]];
-        let part = ((time - from) / (to - from)).clamp(0.0, 1.0);
-        Moment { segment, part }
+        Moment::of(&self.times, time)
+    }
+
+    /// When its sets of vertices are: absolute, strictly increasing, two at least.
+    pub fn times(&self) -> &[f32] {
+        &self.times
     }
 
     #[inline]

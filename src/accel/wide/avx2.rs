@@ -12,7 +12,7 @@ use std::mem::offset_of;
 use glam::Vec3;
 
 use super::kernel::{Ends, Lanes};
-use super::node::{BLOCK, Block, Entry, Node, WIDTH};
+use super::node::{BLOCK, Block, Corners, Entry, Node, Slabs, WIDTH};
 use super::state::{BLOCK_AXIS, NEAR, State};
 use crate::accel::boxes::{LOST, SMALLEST, WIDEN};
 use crate::accel::triangle::{AXES, GREATEST, greatest};
@@ -114,12 +114,21 @@ pub(super) unsafe fn aim(ray: &Ray, state: &mut State) {
 /// # Safety
 /// The processor has AVX2 and FMA.
 #[inline(always)]
-pub(super) unsafe fn slabs(node: &Node, ray: &State) -> (__m256, __m256) {
+pub(super) unsafe fn slabs(node: &Node, way: Option<&Slabs>, ray: &State) -> (__m256, __m256) {
     // SAFETY: the caller has the instructions; `ray.near` holds offsets of slabs of the node, whose
-    // neighbours are 32 bytes away.
+    // neighbours are 32 bytes away, and which go as those of the way do.
     unsafe {
-        let slabs = node.slabs.as_ptr().cast::<u8>();
-        let plane = |offset: u8| _mm256_load_ps(slabs.add(usize::from(offset)).cast());
+        let at = |slabs: &[[f32; WIDTH]; 6], offset: u8| {
+            _mm256_load_ps(slabs.as_ptr().byte_add(usize::from(offset)).cast())
+        };
+        let plane = |offset: u8| match way {
+            Some(Slabs(way)) => _mm256_fmadd_ps(
+                at(way, offset),
+                _mm256_set1_ps(ray.part),
+                at(&node.slabs, offset),
+            ),
+            None => at(&node.slabs, offset),
+        };
         let enter = |axis: usize| {
             let inverse = _mm256_set1_ps(ray.inverse[axis]);
             let entering = _mm256_set1_ps(ray.entering[axis]);
@@ -147,10 +156,10 @@ unsafe impl Lanes for Avx2 {
     }
 
     #[inline(always)]
-    unsafe fn enter(node: &Node, ray: &State, stack: *mut Entry) -> u32 {
+    unsafe fn enter(node: &Node, way: Option<&Slabs>, ray: &State, stack: *mut Entry) -> u32 {
         // SAFETY: the caller has AVX2 and FMA and room for eight entries; a mask has eight bits, an octant three.
         unsafe {
-            let (near, far) = slabs(node, ray);
+            let (near, far) = slabs(node, way, ray);
             let order = *node.order.get_unchecked(usize::from(ray.octant));
             let order = _mm256_set1_epi32(order as i32);
             let order = _mm256_srlv_epi32(order, _mm256_setr_epi32(0, 3, 6, 9, 12, 15, 18, 21));
@@ -188,16 +197,22 @@ unsafe impl Lanes for Avx2 {
     }
 
     #[inline(always)]
-    unsafe fn inside(block: &Block, ray: &State) -> u32 {
-        // SAFETY: the caller has AVX2; `ray.axes` holds offsets of the block's axes.
+    unsafe fn inside(block: &Block, way: Option<&Corners>, ray: &State) -> u32 {
+        // SAFETY: the caller has AVX2; `ray.axes` holds offsets of the block's axes, and of those of the way.
         unsafe {
-            let corners = block.corners.as_ptr().cast::<u8>();
+            let at = |corners: &[[[f32; BLOCK]; 3]; 3], axis: usize, corner: usize| {
+                let offset = usize::from(ray.axes[axis]) + 16 * corner;
+                _mm_load_ps(corners.as_ptr().byte_add(offset).cast())
+            };
             let load = |axis: usize, corner: usize| {
-                _mm_load_ps(
-                    corners
-                        .add(usize::from(ray.axes[axis]) + 16 * corner)
-                        .cast(),
-                )
+                let first = at(&block.corners, axis, corner);
+                match way {
+                    Some(Corners(way)) => {
+                        let part = _mm_set1_ps(ray.part);
+                        _mm_add_ps(first, _mm_mul_ps(at(way, axis, corner), part))
+                    }
+                    None => first,
+                }
             };
             let origin = ray.sheared_origin;
             let (ox, oy, oz) = (
@@ -232,9 +247,9 @@ unsafe impl Lanes for Avx2 {
     }
 
     #[inline(always)]
-    unsafe fn meet(block: &Block, ray: &State) -> (f32, usize) {
+    unsafe fn meet(block: &Block, way: Option<&Corners>, ray: &State) -> (f32, usize) {
         // SAFETY: the caller has what is needed.
-        unsafe { meet(block, ray) }
+        unsafe { meet(block, way, ray) }
     }
 
     #[inline(always)]
@@ -270,13 +285,13 @@ unsafe impl Lanes for Avx2 {
 /// # Safety
 /// The processor has AVX2 and FMA.
 #[inline(always)]
-pub(super) unsafe fn meet(block: &Block, ray: &State) -> (f32, usize) {
+pub(super) unsafe fn meet(block: &Block, way: Option<&Corners>, ray: &State) -> (f32, usize) {
     let mut best = (f32::NAN, 0);
     let mut lanes = u32::from(ray.lanes);
     while lanes != 0 {
         let lane = lanes.trailing_zeros() as usize & (BLOCK - 1);
         // SAFETY: the caller's word.
-        let t = unsafe { distance(block, lane, ray) };
+        let t = unsafe { distance(block, way, lane, ray) };
         // The first of equal ones has the smallest number.
         let better = (t < best.0) | best.0.is_nan();
         best.0 = select_unpredictable(better, t, best.0);
@@ -291,13 +306,20 @@ pub(super) unsafe fn meet(block: &Block, ray: &State) -> (f32, usize) {
 /// # Safety
 /// The processor has AVX2 and FMA, and the block this lane.
 #[inline(always)]
-unsafe fn distance(block: &Block, lane: usize, ray: &State) -> f32 {
+unsafe fn distance(block: &Block, way: Option<&Corners>, lane: usize, ray: &State) -> f32 {
     // SAFETY: the caller has the instructions; four values from these fields on are in the ray.
     unsafe {
         let field = |offset: usize| _mm_loadu_ps((&raw const *ray).cast::<f32>().byte_add(offset));
-        let corner = |c: usize| {
-            let [x, y, z] = [0, 1, 2].map(|axis| *block.corners[axis][c].get_unchecked(lane));
+        let of = |corners: &[[[f32; BLOCK]; 3]; 3], c: usize| {
+            let [x, y, z] = [0, 1, 2].map(|axis| *corners[axis][c].get_unchecked(lane));
             _mm_setr_ps(x, y, z, 0.0)
+        };
+        let corner = |c: usize| match way {
+            Some(Corners(way)) => {
+                let gone = _mm_mul_ps(of(way, c), _mm_set1_ps(ray.part));
+                _mm_add_ps(of(&block.corners, c), gone)
+            }
+            None => of(&block.corners, c),
         };
         let [p, q, r] = [corner(0), corner(1), corner(2)];
         // In double precision: Shear::distance.

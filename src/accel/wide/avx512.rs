@@ -8,7 +8,7 @@ use std::arch::x86_64::*;
 
 use super::avx2;
 use super::kernel::{Ends, FILED, Lanes};
-use super::node::{Block, Entry, Node, OTHER};
+use super::node::{BLOCK, Block, Corners, Entry, Node, OTHER, Slabs};
 use super::state::State;
 use crate::interaction::Ray;
 
@@ -24,10 +24,10 @@ unsafe impl Lanes for Avx512 {
     }
 
     #[inline(always)]
-    unsafe fn enter(node: &Node, ray: &State, stack: *mut Entry) -> u32 {
+    unsafe fn enter(node: &Node, way: Option<&Slabs>, ray: &State, stack: *mut Entry) -> u32 {
         // SAFETY: the caller has the instructions and room for eight entries; an octant has three bits.
         unsafe {
-            let (near, far) = avx2::slabs(node, ray);
+            let (near, far) = avx2::slabs(node, way, ray);
             let entered = _mm256_cmp_ps_mask::<_CMP_LE_OQ>(near, far);
             // Where a child is not entered, further than any bound.
             let near = _mm256_mask_mov_epi32(
@@ -66,16 +66,25 @@ unsafe impl Lanes for Avx512 {
     }
 
     #[inline(always)]
-    unsafe fn inside(block: &Block, ray: &State) -> u32 {
+    unsafe fn inside(block: &Block, way: Option<&Corners>, ray: &State) -> u32 {
         /// Three corners of four triangles.
         const LANES: u16 = 0xfff;
-        // SAFETY: the caller has AVX-512; `ray.axes` holds offsets of the block's axes, and what is not
-        // of an axis is not loaded.
+        // SAFETY: the caller has AVX-512; `ray.axes` holds offsets of the block's axes, and of those of the way, and what
+        // is not of an axis is not loaded.
         unsafe {
-            let corners = block.corners.as_ptr().cast::<u8>();
+            let at = |corners: &[[[f32; BLOCK]; 3]; 3], axis: usize| {
+                let offset = usize::from(ray.axes[axis]);
+                _mm512_maskz_loadu_ps(LANES, corners.as_ptr().byte_add(offset).cast())
+            };
             let from_origin = |axis: usize| {
-                let axis_corners = corners.add(usize::from(ray.axes[axis])).cast();
-                let corners = _mm512_maskz_loadu_ps(LANES, axis_corners);
+                let first = at(&block.corners, axis);
+                let corners = match way {
+                    Some(Corners(way)) => {
+                        let gone = _mm512_mul_ps(at(way, axis), _mm512_set1_ps(ray.part));
+                        _mm512_add_ps(first, gone)
+                    }
+                    None => first,
+                };
                 _mm512_sub_ps(corners, _mm512_set1_ps(ray.sheared_origin[axis]))
             };
             let (x, y, z) = (from_origin(0), from_origin(1), from_origin(2));
@@ -96,9 +105,9 @@ unsafe impl Lanes for Avx512 {
     }
 
     #[inline(always)]
-    unsafe fn meet(block: &Block, ray: &State) -> (f32, usize) {
+    unsafe fn meet(block: &Block, way: Option<&Corners>, ray: &State) -> (f32, usize) {
         // SAFETY: the caller has AVX2 and FMA.
-        unsafe { avx2::meet(block, ray) }
+        unsafe { avx2::meet(block, way, ray) }
     }
 
     #[inline(always)]

@@ -12,8 +12,8 @@ use std::hint::select_unpredictable;
 
 use super::kernel::{Ends, FILED, Lanes};
 use super::node::{
-    BLOCK, BLOCK_INDEX, Block, DONE, EXIT, Entry, LEAF, LEAVE, OTHER, OTHER_INDEX, WIDTH,
-    triangles_of,
+    BLOCK, BLOCK_INDEX, DONE, EXIT, Entry, LEAF, LEAVE, MovingBlock, MovingNode, OTHER,
+    OTHER_INDEX, WIDTH, triangles_of,
 };
 use super::state::{Best, Flight, Start, State};
 use super::{Met, Tree, Walker};
@@ -32,6 +32,7 @@ struct Lists {
     leaves: [List; 2],
     inside: List,
     rest: [List; 2],
+    ended: List,
     /// What those of a list that was just taken in hand visit next.
     currents: List,
 }
@@ -62,12 +63,12 @@ impl Stacks {
                 self.below::<L>(ray)
             };
             let index = ray.current as usize;
-            let node = &*ray.nodes.add(index);
-            let count = if LATER && !ray.later_nodes.is_null() {
-                let node = node.toward(&*ray.later_nodes.add(index), ray.part);
-                L::enter(&node, ray, self.start.add(top))
+            let stack = self.start.add(top);
+            let count = if LATER && ray.is_moving() {
+                let MovingNode { first, way } = &*ray.moving_nodes.add(index);
+                L::enter(first, Some(way), ray, stack)
             } else {
-                L::enter(node, ray, self.start.add(top))
+                L::enter(&*ray.nodes.add(index), None, ray, stack)
             };
             ray.top = select_unpredictable(count == 0, below, top as u32 + count - 1);
             ray.current = *self.start.add(ray.top as usize) as u32;
@@ -111,9 +112,11 @@ impl Stacks {
         let index = (ray.current & BLOCK_INDEX) as usize;
         // SAFETY: the index is a block's, and the caller has what `L` needs.
         let lanes = unsafe {
-            match LATER && !ray.later_blocks.is_null() {
-                true => L::inside(&moved(ray, index), ray),
-                false => L::inside(&*ray.blocks.add(index), ray),
+            if LATER && ray.is_moving() {
+                let MovingBlock { first, way, .. } = &*ray.moving_blocks.add(index);
+                L::inside(first, Some(way), ray)
+            } else {
+                L::inside(&*ray.blocks.add(index), None, ray)
             }
         };
         ray.lanes = lanes as u8;
@@ -129,12 +132,14 @@ impl Stacks {
         let index = ray.current & BLOCK_INDEX;
         // SAFETY: the index is a block's, and the caller has what `L` needs.
         let (t, lane, id) = unsafe {
-            let standing = &*ray.blocks.add(index as usize);
-            let (t, lane) = match LATER && !ray.later_blocks.is_null() {
-                true => L::meet(&moved(ray, index as usize), ray),
-                false => L::meet(standing, ray),
+            let (block, way) = if LATER && ray.is_moving() {
+                let MovingBlock { first, way, .. } = &*ray.moving_blocks.add(index as usize);
+                (first, Some(way))
+            } else {
+                (&*ray.blocks.add(index as usize), None)
             };
-            (t, lane, standing.ids[lane])
+            let (t, lane) = L::meet(block, way, ray);
+            (t, lane, block.ids[lane])
         };
         let limit = ray.limit();
         let better = (t < limit) | ((t == limit) & (id < ray.id));
@@ -190,8 +195,11 @@ impl Stacks {
                 found::<W, ANY, LATER>(walker, ray);
                 // SAFETY: there is room, and the caller has what `L` needs.
                 unsafe {
-                    *self.start.add(ray.top as usize) = EXIT;
-                    ray.top += 1;
+                    // Where nothing is left outside, nobody needs to go back there.
+                    let top = self.start.add(ray.top as usize);
+                    let below = *top.sub(1) as u32;
+                    *top = EXIT;
+                    ray.top += u32::from(below != DONE);
                     enter::<L, LATER>(ray, inner, &start);
                 }
                 return;
@@ -203,36 +211,42 @@ impl Stacks {
 
     /// Asks for what the ray will need in the next round.
     #[inline(always)]
-    fn fetch(self, ray: &State) {
+    fn fetch<const LATER: bool>(self, ray: &State) {
         #[cfg(target_arch = "x86_64")]
         {
+            use super::node::Node;
             use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+            // In cache lines.
+            const LINES: usize = size_of::<Node>().div_ceil(64);
+            const MOVING_LINES: usize = size_of::<MovingNode>().div_ceil(64);
+            const MOVING_BLOCK_LINES: usize = size_of::<MovingBlock>().div_ceil(64);
             let current = ray.current;
             let index = (current & BLOCK_INDEX) as usize;
-            let node = ray.nodes.wrapping_add(current as usize);
-            let block = ray.blocks.wrapping_add(index);
-            let at = select_unpredictable(current >= LEAF, block.cast::<i8>(), node.cast());
+            let is_moving = LATER && ray.is_moving();
+            let (node, block) = if is_moving {
+                let node = ray.moving_nodes.wrapping_add(current as usize);
+                let block = ray.moving_blocks.wrapping_add(index);
+                (node.cast::<i8>(), block.cast::<i8>())
+            } else {
+                let node = ray.nodes.wrapping_add(current as usize);
+                let block = ray.blocks.wrapping_add(index);
+                (node.cast(), block.cast())
+            };
+            let at = select_unpredictable(current >= LEAF, block, node);
             // What is no place in memory would be looked for in all tables of pages.
             let at =
                 select_unpredictable(current >= OTHER, self.start.cast::<i8>().cast_const(), at);
-            for line in 0..4 {
+            let lines = if is_moving { MOVING_LINES } else { LINES };
+            for line in 0..lines {
+                // A block that moves is shorter; its beginning is asked for twice.
+                let line = match is_moving && line >= MOVING_BLOCK_LINES {
+                    true => select_unpredictable(current >= LEAF, 0, line),
+                    false => line,
+                };
                 // SAFETY: a hint never faults, wherever it points.
                 unsafe { _mm_prefetch::<_MM_HINT_T0>(at.wrapping_add(64 * line)) };
             }
         }
-    }
-}
-
-/// A block that moves, as it stands at the ray's time.
-///
-/// # Safety
-/// The index is a block's of the tree that the ray is in, whose blocks move.
-#[inline(always)]
-unsafe fn moved(ray: &State, index: usize) -> Block {
-    // SAFETY: the caller's word; where blocks move there is an end of the way for each.
-    unsafe {
-        let block = &*ray.blocks.add(index);
-        block.toward(&*ray.later_blocks.add(index), ray.part)
     }
 }
 
@@ -248,9 +262,10 @@ fn found<'t, W: Walker<'t>, const ANY: bool, const LATER: bool>(walker: &mut W, 
         let (index, lane) = (ray.place as usize / BLOCK, ray.place as usize % BLOCK);
         // SAFETY: the place is a triangle's in the tree that the ray is in.
         let corners = unsafe {
-            match LATER && !ray.later_blocks.is_null() {
-                true => moved(ray, index).triangle(lane),
-                false => (*ray.blocks.add(index)).triangle(lane),
+            if LATER && ray.is_moving() {
+                (*ray.moving_blocks.add(index)).triangle(lane, ray.part)
+            } else {
+                (*ray.blocks.add(index)).triangle(lane)
             }
         };
         uv = Shear::barycentric(ray.shear().edges(corners));
@@ -319,6 +334,7 @@ pub(super) unsafe fn batch<
         leaves: [NONE; 2],
         inside: NONE,
         rest: [NONE; 2],
+        ended: NONE,
         currents: NONE,
     };
     let bottoms: [u32; IN_FLIGHT] = std::array::from_fn(|slot| flight.bottom(slot));
@@ -340,6 +356,7 @@ pub(super) unsafe fn batch<
         let rest_lists = lists.rest.as_mut_ptr();
         let (mut rest, mut later_rest) = (rest_lists.cast::<u32>(), rest_lists.add(1).cast());
         let inside = lists.inside.as_mut_ptr();
+        let ended = lists.ended.as_mut_ptr();
         let currents = lists.currents.as_mut_ptr();
         while node_count + leaf_count + rest_count > 0 {
             node_steps += node_count as u64;
@@ -348,7 +365,7 @@ pub(super) unsafe fn batch<
                 stacks.step::<L, ANY, LATER>(ray);
                 *currents.add(i) = ray.current;
                 if FETCH {
-                    stacks.fetch(ray);
+                    stacks.fetch::<LATER>(ray);
                 }
             }
             let mut ends = Ends {
@@ -381,14 +398,24 @@ pub(super) unsafe fn batch<
                 (ray.top, ray.current) = stacks.next::<L, ANY>(ray);
                 *currents.add(i) = ray.current;
                 if FETCH {
-                    stacks.fetch(ray);
+                    stacks.fetch::<LATER>(ray);
                 }
             }
             ends.leaves = later_leaves;
             L::file(leaves, currents, leaf_count, &mut ends);
             rest_count = ends.rest.offset_from(rest) as usize;
+            // Those that have ended are taken apart: what comes next in a list of both nobody can foretell.
+            let (mut ended_count, mut others) = (0, 0);
+            for i in 0..rest_count {
+                let slot = *rest.add(i);
+                let has_ended = (*states.add(slot as usize)).current == DONE;
+                *ended.add(ended_count) = slot;
+                *rest.add(others) = slot;
+                ended_count += usize::from(has_ended);
+                others += usize::from(!has_ended);
+            }
             if FETCH {
-                for i in 0..rest_count {
+                for i in 0..others {
                     let ray = &*states.add(*rest.add(i) as usize);
                     if ray.current < LEAVE {
                         walker.fetch(ray.instance, ray.current & OTHER_INDEX);
@@ -396,20 +423,26 @@ pub(super) unsafe fn batch<
                 }
             }
             let mut ready = 0;
-            for i in 0..rest_count {
+            for i in 0..others {
                 let slot = *rest.add(i);
                 let ray = &mut *states.add(slot as usize);
-                if ray.current != DONE {
-                    stacks.other::<L, W, ANY, LATER>(ray, tree, walker);
+                stacks.other::<L, W, ANY, LATER>(ray, tree, walker);
+                let has_ended = ray.current == DONE;
+                *ended.add(ended_count) = slot;
+                *rest.add(ready) = slot;
+                *currents.add(ready) = ray.current;
+                ended_count += usize::from(has_ended);
+                ready += usize::from(!has_ended);
+            }
+            for i in 0..ended_count {
+                let slot = *ended.add(i);
+                let ray = &mut *states.add(slot as usize);
+                found::<W, ANY, LATER>(walker, ray);
+                if next == count {
+                    continue;
                 }
-                if ray.current == DONE {
-                    found::<W, ANY, LATER>(walker, ray);
-                    if next == count {
-                        continue;
-                    }
-                    begin::<L, W, LATER>(walker, next, ray, tree, bottoms[slot as usize]);
-                    next += 1;
-                }
+                begin::<L, W, LATER>(walker, next, ray, tree, bottoms[slot as usize]);
+                next += 1;
                 *rest.add(ready) = slot;
                 *currents.add(ready) = ray.current;
                 ready += 1;

@@ -15,7 +15,7 @@ use std::ptr::NonNull;
 
 use rayon::prelude::*;
 
-use super::node::{Block, Corners, Node, Slabs};
+use super::node::{Block, MovingBlock, MovingNode, Node};
 use crate::file::read_at;
 
 /// The size of a huge page; on machines with others this is only an alignment.
@@ -33,9 +33,9 @@ unsafe impl Plain for Node {}
 unsafe impl Plain for Block {}
 
 // SAFETY: as above.
-unsafe impl Plain for Slabs {}
+unsafe impl Plain for MovingNode {}
 // SAFETY: as above.
-unsafe impl Plain for Corners {}
+unsafe impl Plain for MovingBlock {}
 
 /// A fixed number of plain values.
 pub(super) struct Huge<T: Plain> {

@@ -2,11 +2,12 @@
 
 #![allow(unsafe_code)]
 
-use super::node::{Block, Entry, LEAF, Node, OTHER};
+use super::node::{Block, Corners, Entry, LEAF, Node, OTHER, Slabs};
 use super::state::State;
 use crate::interaction::Ray;
 
-/// The steps of a walk that are done on lanes.
+/// The steps of a walk that are done on lanes. Of what moves it is told how far, and takes it as it stands at the ray's
+/// part of the way.
 ///
 /// # Safety
 /// An implementation may need instructions that not every processor has: its functions must be called, or
@@ -26,7 +27,7 @@ pub(super) unsafe trait Lanes: Copy {
     ///
     /// # Safety
     /// Eight entries can be written.
-    unsafe fn enter(node: &Node, ray: &State, stack: *mut Entry) -> u32;
+    unsafe fn enter(node: &Node, way: Option<&Slabs>, ray: &State, stack: *mut Entry) -> u32;
 
     /// The last of eight entries that is within reach; the first where none is.
     ///
@@ -38,14 +39,14 @@ pub(super) unsafe trait Lanes: Copy {
     ///
     /// # Safety
     /// See the trait.
-    unsafe fn inside(block: &Block, ray: &State) -> u32;
+    unsafe fn inside(block: &Block, way: Option<&Corners>, ray: &State) -> u32;
 
     /// The first hit among the triangles `ray.lanes`: its distance, not a number where there is none, and
     /// its lane.
     ///
     /// # Safety
     /// See the trait.
-    unsafe fn meet(block: &Block, ray: &State) -> (f32, usize);
+    unsafe fn meet(block: &Block, way: Option<&Corners>, ray: &State) -> (f32, usize);
 
     /// Puts rays, given by their slots and what they visit next, at the ends of the lists where they belong.
     ///

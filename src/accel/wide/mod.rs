@@ -40,7 +40,7 @@ use crate::interaction::Ray;
 use crate::lanes::Kernel;
 use crate::shape::Bounds;
 use huge_pages::Huge;
-use node::{Block, Corners, Node, Slabs};
+use node::{Block, MovingBlock, MovingNode, Node};
 use state::Flight;
 
 pub(super) use state::{Best, Place, Start, Visit};
@@ -93,15 +93,15 @@ pub(super) struct Tree {
     blocks: Huge<Block>,
     /// Nodes on the longest way down.
     levels: usize,
-    /// Where everything goes, if it moves.
+    /// In place of nodes and blocks where everything moves.
     later: Option<Later>,
 }
 
-/// The end of a tree's way, which every ray meets at its own time.
+/// A tree that every ray meets at its own time.
 #[derive(Debug)]
 struct Later {
-    nodes: Huge<Slabs>,
-    blocks: Huge<Corners>,
+    nodes: Huge<MovingNode>,
+    blocks: Huge<MovingBlock>,
 }
 
 /// What a batch may skip, since no tree asks for it.
@@ -152,7 +152,7 @@ impl Tree {
         (tree, others, used)
     }
 
-    /// A box around all items, at the beginning of their way.
+    /// A box around all items, where they stand.
     pub(super) fn bounds(&self) -> Bounds {
         let [low, high] = [0, 1].map(|side| [0, 2, 4].map(|axis| self.nodes[0].slabs[axis + side]));
         Bounds {
@@ -163,6 +163,11 @@ impl Tree {
                 .map(|high| high.into_iter().fold(f32::NEG_INFINITY, f32::max))
                 .into(),
         }
+    }
+
+    /// Whether all items are others than triangles.
+    pub(super) fn holds_no_triangle(&self) -> bool {
+        self.blocks.is_empty() && self.later.is_none()
     }
 
     /// Nodes on the longest way down.

@@ -70,13 +70,13 @@ impl Node {
         }
     };
 
-    /// The node while its planes go to others; `part` is in [0, 1].
+    /// The node with its planes a part of their way along, in [0, 1].
     #[inline(always)]
-    pub(super) fn toward(&self, later: &Slabs, part: f32) -> Self {
+    pub(super) fn along(&self, way: &Slabs, part: f32) -> Self {
         let mut node = *self;
-        for (plane, later) in node.slabs.iter_mut().zip(&later.0) {
-            for (from, to) in plane.iter_mut().zip(later) {
-                *from += (*to - *from) * part;
+        for (plane, way) in node.slabs.iter_mut().zip(&way.0) {
+            for (plane, way) in plane.iter_mut().zip(way) {
+                *plane = way.mul_add(part, *plane);
             }
         }
         node
@@ -116,16 +116,49 @@ impl Node {
     }
 }
 
-/// Where the planes of a node that moves end: as [`Node::slabs`]. Lanes without a child are far away on the wrong side
-/// at both ends, for between infinities there is no number.
+/// How far the planes of a node go: as [`Node::slabs`]; 0 in a lane without a child.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(super) struct Slabs(pub(super) [[f32; WIDTH]; 6]);
 
-/// Where the corners of a block that moves end: as [`Block::corners`].
+/// How far the corners of a block go: as [`Block::corners`]; 0 where there is no triangle.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(16))]
 pub(super) struct Corners(pub(super) [[[f32; BLOCK]; 3]; 3]);
+
+/// A node as it stands at first, and how far its planes go: one behind the other, as a ray needs both.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub(super) struct MovingNode {
+    pub(super) first: Node,
+    pub(super) way: Slabs,
+}
+
+/// A block as it stands at first, and how far its corners go. It fills whole cache lines.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+pub(super) struct MovingBlock {
+    pub(super) first: Block,
+    pub(super) way: Corners,
+    unused: [u32; 4],
+}
+
+impl MovingBlock {
+    pub(super) fn new(first: Block, way: Corners) -> Self {
+        Self {
+            first,
+            way,
+            unused: [0; 4],
+        }
+    }
+
+    /// A triangle's corners a part of their way along, in [0, 1].
+    #[inline(always)]
+    pub(super) fn triangle(&self, lane: usize, part: f32) -> [Vec3; 3] {
+        let (first, way) = (self.first.triangle(lane), of_lane(&self.way.0, lane));
+        [0, 1, 2].map(|c| first[c] + way[c] * part)
+    }
+}
 
 /// Up to four triangles. Lanes are in the order of the ids.
 #[derive(Clone, Copy, Debug)]
@@ -167,14 +200,14 @@ impl Block {
         LEAF | (triangles as u32 - 1) << COUNT_SHIFT | index as u32
     }
 
-    /// The block while its corners go to others; `part` is in [0, 1].
+    /// The block with its corners a part of their way along, in [0, 1].
     #[inline(always)]
-    pub(super) fn toward(&self, later: &Corners, part: f32) -> Self {
+    pub(super) fn along(&self, way: &Corners, part: f32) -> Self {
         let mut block = *self;
-        for (axis, later) in block.corners.iter_mut().zip(&later.0) {
-            for (corner, later) in axis.iter_mut().zip(later) {
-                for (from, to) in corner.iter_mut().zip(later) {
-                    *from += (*to - *from) * part;
+        for (axis, way) in block.corners.iter_mut().zip(&way.0) {
+            for (corner, way) in axis.iter_mut().zip(way) {
+                for (corner, way) in corner.iter_mut().zip(way) {
+                    *corner += *way * part;
                 }
             }
         }
@@ -184,8 +217,13 @@ impl Block {
     /// A triangle's corners.
     #[inline(always)]
     pub(super) fn triangle(&self, lane: usize) -> [Vec3; 3] {
-        let [x, y, z] = &self.corners;
-        let corner = |c: usize| Vec3::new(x[c][lane], y[c][lane], z[c][lane]);
-        [corner(0), corner(1), corner(2)]
+        of_lane(&self.corners, lane)
     }
+}
+
+/// The three of a lane.
+#[inline(always)]
+fn of_lane([x, y, z]: &[[[f32; BLOCK]; 3]; 3], lane: usize) -> [Vec3; 3] {
+    let corner = |c: usize| Vec3::new(x[c][lane], y[c][lane], z[c][lane]);
+    [corner(0), corner(1), corner(2)]
 }

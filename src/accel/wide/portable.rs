@@ -3,7 +3,7 @@
 #![allow(unsafe_code)]
 
 use super::kernel::Lanes;
-use super::node::{BLOCK, Block, Entry, Node, WIDTH, entry};
+use super::node::{BLOCK, Block, Corners, Entry, Node, Slabs, WIDTH, entry};
 use super::state::State;
 use crate::accel::boxes::WIDEN;
 use crate::accel::triangle::{Shear, greatest, least};
@@ -16,7 +16,8 @@ pub(super) struct Portable;
 // SAFETY: it needs nothing of the processor, and writes eight entries at the pointers at most.
 unsafe impl Lanes for Portable {
     #[inline(always)]
-    unsafe fn enter(node: &Node, ray: &State, stack: *mut Entry) -> u32 {
+    unsafe fn enter(node: &Node, way: Option<&Slabs>, ray: &State, stack: *mut Entry) -> u32 {
+        let node = way.map_or(*node, |way| node.along(way, ray.part));
         let mut near = [0.0_f32; WIDTH];
         let mut far = [f32::INFINITY; WIDTH];
         for axis in 0..3 {
@@ -51,14 +52,16 @@ unsafe impl Lanes for Portable {
     }
 
     #[inline(always)]
-    unsafe fn inside(block: &Block, ray: &State) -> u32 {
+    unsafe fn inside(block: &Block, way: Option<&Corners>, ray: &State) -> u32 {
+        let block = way.map_or(*block, |way| block.along(way, ray.part));
         let shear = ray.shear();
         let inside = |lane: usize| Shear::inside(shear.edges(block.triangle(lane)));
         (0..BLOCK).fold(0, |lanes, lane| lanes | u32::from(inside(lane)) << lane)
     }
 
     #[inline(always)]
-    unsafe fn meet(block: &Block, ray: &State) -> (f32, usize) {
+    unsafe fn meet(block: &Block, way: Option<&Corners>, ray: &State) -> (f32, usize) {
+        let block = way.map_or(*block, |way| block.along(way, ray.part));
         let (shear, boxes) = (ray.shear(), ray.boxes());
         let mut best = (f32::NAN, 0);
         for lane in (0..BLOCK).filter(|lane| ray.lanes >> lane & 1 == 1) {

@@ -7,7 +7,7 @@ use std::ptr::null;
 use glam::Vec3;
 
 use super::Tree;
-use super::node::{BOTTOM, Block, Corners, DONE, Entry, Node, Slabs, WIDTH, entry};
+use super::node::{BOTTOM, Block, DONE, Entry, MovingBlock, MovingNode, Node, WIDTH, entry};
 use crate::accel::boxes::RayBoxes;
 use crate::accel::triangle::Shear;
 use crate::interaction::{Hit, Ray};
@@ -77,7 +77,7 @@ impl Place {
 
 /// A ray on its way. The first cache line is what a node needs, the second what a block needs.
 ///
-/// `nodes` and `blocks`, and where they go, are those of the tree that the ray is in, and live as long as the walk.
+/// `nodes` and `blocks`, and those that move, are those of the tree that the ray is in, and live as long as the walk.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(super) struct State {
@@ -114,10 +114,10 @@ pub(super) struct State {
     pub(super) ray: u32,
     /// As in [`Start`].
     pub(super) part: f32,
-    /// Where nodes go; null where they stand.
-    pub(super) later_nodes: *const Slabs,
-    /// Where blocks go; null where they stand.
-    pub(super) later_blocks: *const Corners,
+    /// In place of `nodes` where they move; null where they stand.
+    pub(super) moving_nodes: *const MovingNode,
+    /// In place of `blocks` where they move.
+    pub(super) moving_blocks: *const MovingBlock,
 }
 
 /// A node's slabs of one axis, and a block's corners of one axis, in bytes.
@@ -160,8 +160,8 @@ impl State {
         instance: Hit::NONE,
         ray: 0,
         part: 0.0,
-        later_nodes: null(),
-        later_blocks: null(),
+        moving_nodes: null(),
+        moving_blocks: null(),
     };
 
     /// Begins with a ray; `bottom` is its stack's. What remains is to enter a tree.
@@ -185,14 +185,20 @@ impl State {
         self.instance = start.instance;
     }
 
-    /// The same with where the tree goes, which batches without trees that move never look at.
+    /// The same with what moves, which batches without trees that move never look at.
     #[inline(always)]
     pub(super) fn follow(&mut self, tree: &Tree, start: &Start) {
         self.part = start.part;
-        (self.later_nodes, self.later_blocks) = match &tree.later {
+        (self.moving_nodes, self.moving_blocks) = match &tree.later {
             Some(later) => (later.nodes.as_ptr(), later.blocks.as_ptr()),
             None => (null(), null()),
         };
+    }
+
+    /// Whether the tree that the ray is in moves.
+    #[inline(always)]
+    pub(super) fn is_moving(&self) -> bool {
+        !self.moving_nodes.is_null()
     }
 
     /// Keeps a ray that is not finite from meeting anything: its comparisons would go any way.

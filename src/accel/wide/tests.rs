@@ -5,7 +5,7 @@
 use glam::Vec3;
 
 use super::kernel::{Ends, FILED, Lanes};
-use super::node::{BOTTOM, DONE, Entry, LEAF, OTHER, WIDTH, entry};
+use super::node::{BLOCK, BOTTOM, Corners, DONE, Entry, LEAF, OTHER, Slabs, WIDTH, entry};
 use super::portable::Portable;
 use super::state::State;
 use super::*;
@@ -38,7 +38,7 @@ fn ray<L: Lanes>(i: u32) -> State {
         },
         instance: 0,
         entry: number(3, i).max(0.0),
-        part: 0.0,
+        part: number(10, i).abs(),
         best: Best {
             t: 1.0 + number(4, i),
             id: u32::MAX,
@@ -50,6 +50,7 @@ fn ray<L: Lanes>(i: u32) -> State {
     state.enter(&Tree::default(), &start);
     // SAFETY: the caller has what the kernel needs.
     unsafe { L::aim(&start.ray, &mut state) };
+    state.part = start.part;
     state.lanes = random::bits(5, i) as u8 & 15;
     state
 }
@@ -76,24 +77,54 @@ fn block(i: u32) -> Block {
     Block::new(&mut triangles)
 }
 
+/// How far a node and a block go.
+fn ways(i: u32, node: &Node, block: &Block) -> (Slabs, Corners) {
+    let mut slabs = Slabs([[0.0; WIDTH]; 6]);
+    let mut corners = Corners([[[0.0; BLOCK]; 3]; 3]);
+    let gone = |k: u32| 0.2 * number(12, 128 * i + k);
+    for (k, (way, plane)) in (0..).zip(slabs.0.iter_mut().zip(&node.slabs)) {
+        for (lane, way) in (0..)
+            .zip(way)
+            .filter(|(lane, _)| plane[*lane as usize].is_finite())
+        {
+            *way = gone(8 * k + lane);
+        }
+    }
+    for (k, corner) in (48..).zip(corners.0.as_flattened_mut()) {
+        let there = (0..)
+            .zip(corner)
+            .zip(block.ids)
+            .filter(|(_, id)| *id != u32::MAX);
+        for ((lane, way), _) in there {
+            *way = gone(4 * k - 144 + lane);
+        }
+    }
+    (slabs, corners)
+}
+
 /// Everything that a kernel's steps say of many random lanes.
 fn answers<L: Lanes>() -> Vec<u32> {
     let mut said = Vec::new();
     for i in 0..5000 {
         let (ray, node, block) = (ray::<L>(i), node(i), block(i));
+        let ways = ways(i, &node, &block);
+        let (nodes_way, blocks_way) = match i.is_multiple_of(3) {
+            true => (Some(&ways.0), Some(&ways.1)),
+            false => (None, None),
+        };
         let mut stack: [Entry; WIDTH] = [0; WIDTH];
         let distance = |k: u32| 1.0 + number(9, 8 * i + k);
         let mut entries: [Entry; WIDTH] = std::array::from_fn(|k| entry(distance(k as u32), 0));
         entries[..(i % 9) as usize].fill(BOTTOM);
         // SAFETY: the caller has what the kernel needs; there is room for eight.
         unsafe {
-            let count = L::enter(&node, &ray, stack.as_mut_ptr());
+            let count = L::enter(&node, nodes_way, &ray, stack.as_mut_ptr());
             said.push(count);
             said.extend(stack.iter().take(count as usize).map(|e| (e >> 32) as u32));
             said.extend(stack.iter().take(count as usize).map(|e| *e as u32));
             said.push(L::pop(entries.as_ptr(), ray.bound));
-            said.push(L::inside(&block, &ray));
-            let (t, lane) = L::meet(&block, &ray);
+            said.push(L::inside(&block, blocks_way, &ray));
+            let (t, lane) = L::meet(&block, blocks_way, &ray);
             said.extend(if t.is_nan() {
                 [0, 0]
             } else {
