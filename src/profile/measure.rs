@@ -92,7 +92,7 @@ impl Effort {
 pub fn run(settings: &Settings, watch: &dyn Watch) -> Result<Option<Profile>> {
     let begin = Instant::now();
     let mut stage = Stage::new(settings)?;
-    let mut notes = Vec::new();
+    let mut notes = stage.notes().to_vec();
     let extent = Extent {
         axes: settings.axes.clone(),
         effort: settings.effort,

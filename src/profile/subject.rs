@@ -14,7 +14,7 @@ use super::measure::Settings;
 use super::resize::{ply, resized};
 use super::sweep::{Look, Setting};
 use crate::description::{self, Description};
-use crate::error::{Error, Result};
+use crate::error::{Error, Problem, Result};
 use crate::mesh::{Mesh, ReadOptions, read, terrain};
 use crate::render::{Options, Overrides, Session, Silent, UpAxis, find_sensor, is_mesh};
 
@@ -70,6 +70,8 @@ pub(super) struct Stage {
     folder: TempDir,
     /// Meshes in the folder, by number of triangles.
     meshes: HashMap<u32, PathBuf>,
+    /// What was left out in reading it.
+    notes: Vec<String>,
 }
 
 #[derive(Debug)]
@@ -109,10 +111,13 @@ impl Stage {
         } = settings;
         let folder = tempfile::tempdir()
             .map_err(|e| Error::system("make a folder for meshes", &std::env::temp_dir(), &e))?;
+        let mut notes = Vec::new();
         let source = match subject {
             Subject::Terrain => Source::Terrain,
             Subject::Mesh { path, up } => {
-                let mesh = read(path, &ReadOptions::BARE, budget)?.mesh;
+                let read = read(path, &ReadOptions::BARE, budget)?;
+                notes.extend(read.warnings.iter().map(Problem::to_string));
+                let mesh = read.mesh;
                 if mesh.triangles.is_empty() {
                     return Err(Error::input(format!(
                         "{} holds no triangle",
@@ -166,7 +171,13 @@ impl Stage {
             overrides: overrides.clone(),
             folder,
             meshes: HashMap::new(),
+            notes,
         })
+    }
+
+    /// What was left out in reading it.
+    pub(super) fn notes(&self) -> &[String] {
+        &self.notes
     }
 
     /// Whether the number of triangles is ours to choose.

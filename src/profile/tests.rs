@@ -183,6 +183,20 @@ fn a_mesh_and_a_scene_are_profiled_as_well() {
     // Two triangles, cut in four again and again.
     assert!(tree.points.iter().any(|p| p.primitives == 2 << 10));
     assert!(tree.points.iter().all(|p| p.stats.shaded > 0));
+    assert!(mesh.notes.is_empty());
+    let path = folder.path().join("animated.gltf");
+    let text = r#"{"asset": {"version": "2.0"}, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}], "animations": [{"channels": [], "samplers": []}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
+        "bufferViews": [{"buffer": 0, "byteLength": 36}], "buffers": [{"byteLength": 36, "uri":
+        "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}]}"#;
+    std::fs::write(&path, text).unwrap();
+    let animated = of(path, &[Axis::Pixels]);
+    assert!(
+        (animated.notes.iter()).any(|note| note.contains("animations are left out")),
+        "{:?}",
+        animated.notes
+    );
     let path = folder.path().join("scene.xml");
     std::fs::write(
         &path,
