@@ -1,5 +1,6 @@
 //! What motion costs: the same rays through a mesh that stands, that stands as an instance, that moves and turns, and
-//! that deforms, in turns, by one thread, in its processor time.
+//! that deforms, in turns, by one thread, in its processor time. Each but the first is met alone in its world, and beside
+//! a triangle that rays from the camera pass by: rays begin in the tree of an instance that is all there is.
 //!
 //!     cargo bench --bench motion -- dragon.ply
 //!
@@ -62,16 +63,26 @@ fn deforming(mesh: &Mesh) -> Geometry {
     Geometry::Deforming(deforming.unwrap_or_else(|(_, why)| panic!("{why}")))
 }
 
-fn tracer(geometry: Geometry, instance: Option<Moving>) -> Tracer {
+fn tracer(geometry: Geometry, instance: Option<Moving>, company: Option<Geometry>) -> Tracer {
     let instances = instance.map(|to_world| Instance { to_world, group: 1 });
-    let group = instances.is_some() as u32;
-    let shapes = vec![Arc::new(geometry)];
+    let mut groups = vec![instances.is_some() as u32];
+    groups.extend(company.iter().map(|_| 0));
+    let shapes = std::iter::once(geometry).chain(company).map(Arc::new);
     Tracer::new(
-        shapes,
-        &[group],
+        shapes.collect(),
+        &groups,
         instances.into_iter().collect(),
         Method::Tree,
     )
+}
+
+/// A triangle below the mesh and all rays from the camera.
+fn triangle() -> Option<Geometry> {
+    let mut mesh = mesh::rectangle();
+    mesh.triangles.truncate(1);
+    let place = DVec3::new(0.0, -1.2, -0.5);
+    mesh.transform(&(DMat4::from_translation(place) * DMat4::from_scale(DVec3::splat(0.01))));
+    Some(Geometry::Mesh(TriangleMesh::new(mesh)))
 }
 
 /// From one point side by side, at random times.
@@ -116,13 +127,28 @@ fn main() {
     let deforms = deforming(&mesh);
     let bytes = [still().bytes(), deforms.bytes()];
     let tracers = [
-        ("stands", tracer(still(), None)),
+        ("stands", tracer(still(), None, None)),
         (
             "stands as an instance",
-            tracer(still(), Some(Moving::IDENTITY)),
+            tracer(still(), Some(Moving::IDENTITY), None),
         ),
-        ("moves", tracer(still(), Some(moving()))),
-        ("deforms", tracer(deforms, Some(Moving::IDENTITY))),
+        ("moves", tracer(still(), Some(moving()), None)),
+        (
+            "deforms",
+            tracer(deforming(&mesh), Some(Moving::IDENTITY), None),
+        ),
+        (
+            "stands so, not alone",
+            tracer(still(), Some(Moving::IDENTITY), triangle()),
+        ),
+        (
+            "moves, not alone",
+            tracer(still(), Some(moving()), triangle()),
+        ),
+        (
+            "deforms, not alone",
+            tracer(deforms, Some(Moving::IDENTITY), triangle()),
+        ),
     ];
     let memory = |which: usize, geometry: usize| bytes[geometry] + tracers[which].1.tree_bytes();
     println!("{triangles} triangles, {}", tracers[0].1.kernel().name());
