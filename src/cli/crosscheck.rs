@@ -1,13 +1,16 @@
 //! `etendue crosscheck`: scenes on both sides, here and in Mitsuba, and whether the images agree.
 
 use std::num::NonZeroUsize;
-use std::path::{Component, PathBuf};
+use std::path::{Component, Path, PathBuf};
 use std::time::Duration;
 
 use clap::{Args, ValueEnum};
-use etendue::crosscheck::{self, Python, Settings, Side, Watch};
+use etendue::budget::Budget;
+use etendue::crosscheck::{self, Failure, Python, Settings, Side, Watch};
+use etendue::description;
 use etendue::error::{Error, Result};
-use etendue::render::is_mesh;
+use etendue::render::{Staging, describe_mesh, is_mesh};
+use tempfile::TempDir;
 
 use super::oracle::Subject;
 use super::overrides::ImageArguments;
@@ -34,10 +37,12 @@ use super::{output, parse, status};
 /// With --against raster no image is rendered and nothing else is needed: what rays see at pixel centres is held
 /// against what this program's z-buffer sees there, away from silhouettes: depth, position, normals, texture
 /// coordinates, shapes and triangles.
+///
+/// Of a bare mesh the scene around it is compared, as `etendue render --write-scene` writes it.
 #[derive(Args, Debug)]
 #[command(after_help = HELP)]
 pub(super) struct Arguments {
-    /// Scene files (.xml)
+    /// Scene files (.xml), or bare meshes
     #[arg(required_unless_present = "install", value_name = "SCENE")]
     scenes: Vec<PathBuf>,
     #[command(flatten)]
@@ -164,12 +169,6 @@ impl Arguments {
             let message = "--reference is another form of one scene, and there are several";
             return Err(Error::input(message));
         }
-        if let Some(mesh) = self.scenes.iter().find(|scene| is_mesh(scene)) {
-            let mesh = mesh.display();
-            let error = Error::input(format!("{mesh} is a mesh, and a scene is wanted"));
-            let help = "write the scene around it: etendue render";
-            return Err(error.help(format!("{help} {mesh} -o OUT.png --write-scene OUT.xml")));
-        }
         let plugins = self.plugins.clone();
         if let Some(folder) = plugins.as_ref().filter(|folder| !folder.is_dir()) {
             return Err(Error::input(format!("{} is no folder", folder.display())));
@@ -216,6 +215,28 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     Ok(status)
 }
 
+/// The scene around a bare mesh, in a file for both sides to read.
+struct Around {
+    scene: PathBuf,
+    /// Where that is, as long as it is wanted.
+    _folder: TempDir,
+}
+
+impl Around {
+    fn mesh(mesh: &Path) -> Result<Self> {
+        let refused = |e| Error::system("write in", &std::env::temp_dir(), &e);
+        let folder = TempDir::with_prefix("etendue-").map_err(refused)?;
+        let options = description::Options::default();
+        let bare = describe_mesh(mesh, &Staging::default(), &options, &Budget::default())?;
+        let scene = folder.path().join("scene.xml");
+        etendue::file::write_atomically(&scene, bare.text.as_bytes())?;
+        Ok(Self {
+            scene,
+            _folder: folder,
+        })
+    }
+}
+
 fn beside_mitsuba(arguments: &Arguments, told: Told) -> Result<u8> {
     if let Some(folder) = &arguments.report {
         page::check_writable(folder)?;
@@ -246,7 +267,14 @@ fn beside_mitsuba(arguments: &Arguments, told: Told) -> Result<u8> {
         let name = scene.display().to_string();
         let steps = Steps::new(told, &name, Count::Images);
         let watch = Progress { steps, stop: &stop };
-        let result = crosscheck::crosscheck(scene, &settings, &watch);
+        let compare = |scene: &Path| crosscheck::crosscheck(scene, &settings, &watch);
+        let result = match is_mesh(scene) {
+            true => match Around::mesh(scene) {
+                Ok(around) => compare(&around.scene),
+                Err(error) => Err(Failure::NotComparable(error.to_string())),
+            },
+            false => compare(scene),
+        };
         watch.steps.finish();
         let ending = Ending::of(result, style);
         verdicts::tell(style, &name, &ending);

@@ -21,7 +21,7 @@ use super::{output, parse, status};
 #[derive(Args, Debug)]
 #[command(after_help = format!("{EXAMPLES}\n\n{}", status::HELP))]
 pub(super) struct Arguments {
-    /// Where the image goes: .exr, .hdr, .tif or .png
+    /// Where the image goes: .exr, .hdr, .pfm, .tif, .png or .jpg
     #[arg(value_name = "OUT")]
     output: PathBuf,
     /// The parts, in any order

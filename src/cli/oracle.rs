@@ -7,7 +7,7 @@ use etendue::budget::Budget;
 use etendue::description::Description;
 use etendue::error::{Error, Result};
 use etendue::raster::{ALLOWED, Agreement, TOLERANCE};
-use etendue::render::{Options, Session, Silent, find_sensor};
+use etendue::render::{Options, Session, Silent, Staging, describe_mesh, find_sensor, is_mesh};
 use serde_json::json;
 
 use super::overrides::ImageArguments;
@@ -68,7 +68,15 @@ impl Subject<'_> {
 
     fn compare(&self, scene: &Path) -> Result<Agreement> {
         let options = self.read.options(None);
-        let mut description = Description::read(scene, &options, &Budget::default())?;
+        let (mut session, budget) = (Session::default(), Budget::default());
+        let mut description = match is_mesh(scene) {
+            true => {
+                let bare = describe_mesh(scene, &Staging::default(), &options, &budget)?;
+                session.give(bare.mesh);
+                bare.description
+            }
+            false => Description::read(scene, &options, &budget)?,
+        };
         self.image.overrides().apply(&mut description);
         let sensor = match self.image.sensor()? {
             Some(named) => find_sensor(&description, &named)?,
@@ -80,7 +88,7 @@ impl Subject<'_> {
             sensor,
             ..Options::default()
         };
-        Session::default().agreement(&description, &options, &Silent)
+        session.agreement(&description, &options, &Silent)
     }
 
     fn tell(&self, scene: &Path, agreement: &Agreement) {

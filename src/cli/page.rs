@@ -24,9 +24,12 @@ const WORST: usize = 8;
 /// Bytes of exact values that a pair of images may have: those of 96 × 64 pixels fit, and three pairs of 640 × 360 pixels
 /// are a page of 2 MB.
 const MOST_EXACT: usize = 96 << 10;
-/// The quality of pictures that are read in numbers, and of maps. Noise in a map would take more room than the images.
-const EXACT: u8 = 95;
-const MAP: u8 = 80;
+/// Bytes a pixel that a picture may take, and a map: so three pairs of 640 × 480 pixels are a page of 2 MB, however noisy
+/// they are.
+const PICTURE: f64 = 0.5;
+const MAP: f64 = 0.25;
+/// Qualities of JPEG, of which the first is taken that fits, or else the last.
+const QUALITIES: [u8; 6] = [95, 90, 80, 65, 50, 30];
 /// Steps of a colour bar.
 const STEPS: u8 = 16;
 
@@ -138,8 +141,8 @@ impl Pair<'_> {
             "channels": names,
             "shown": self.legend(&names, range),
             "range": range.or((self.encoding == Encoding::Srgb).then_some([0.0, 1.0])),
-            "a": address(&shown(self.reference)?, EXACT)?,
-            "b": address(&shown(self.other)?, EXACT)?,
+            "a": address(&shown(self.reference)?, PICTURE)?,
+            "b": address(&shown(self.other)?, PICTURE)?,
             "exact": exact,
             "error": address(&map([width, height], self.distance, Scale::FromZero, self.top)?, MAP)?,
             "error_label": self.label,
@@ -324,9 +327,19 @@ fn bar(scale: Scale) -> String {
     format!("linear-gradient(to right, {})", colors.join(", "))
 }
 
-/// The picture as an address that holds it.
-fn address(codes: &Codes, quality: u8) -> Result<String> {
-    let bytes = BASE64_STANDARD.encode(codes.to_jpeg_of(quality)?);
+/// The picture as an address that holds it, in about so many bytes a pixel.
+fn address(codes: &Codes, most: f64) -> Result<String> {
+    /// Of small pictures what stands before the pixels is most of the file.
+    const HEAD: f64 = 2048.0;
+    let most = HEAD + most * f64::from(codes.width()) * f64::from(codes.height());
+    let mut jpeg = Vec::new();
+    for quality in QUALITIES {
+        jpeg = codes.to_jpeg_of(quality)?;
+        if jpeg.len() as f64 <= most {
+            break;
+        }
+    }
+    let bytes = BASE64_STANDARD.encode(jpeg);
     Ok(format!("data:image/jpeg;base64,{bytes}"))
 }
 

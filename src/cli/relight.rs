@@ -22,7 +22,7 @@ use super::{output, parse, status};
 pub(super) struct Arguments {
     /// Image with layers (.exr)
     input: PathBuf,
-    /// Where the image goes: .exr or .hdr (linear), .tif, .png or .jpg (for screens)
+    /// Where the image goes: .exr, .hdr or .pfm (linear), .tif, .png or .jpg (for screens)
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
     /// Multiply the layers of that name, one number or three for R,G,B: diffuse=0.5, light.lamp=2,1,0.5; a word

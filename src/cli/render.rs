@@ -15,7 +15,7 @@ use etendue::image;
 use etendue::lanes::Kernel;
 use etendue::render::{
     Adaptive, Checkpoint, Options, Outline, Overrides, Passes, Picture, Progress, Rendered,
-    Session, is_current, is_mesh, is_part, outline, sensors,
+    Session, Staging, is_current, is_mesh, is_part, outline, sensors,
 };
 use glam::DVec3;
 use serde_json::json;
@@ -599,11 +599,10 @@ impl<'a> Series<'a> {
             let posed = posed.get_or_insert_with(|| description.clone());
             let root = posed.root().node_id();
             let shapes = posed.children_of(root, Kind::Shape);
-            let animated = shapes
-                .iter()
-                .find(|shape| posed.node(**shape).plugin() == "gltf");
-            if let Some(shape) = animated {
-                posed.set(*shape, "times", Value::String(times));
+            for shape in shapes {
+                if posed.node(shape).plugin() == "gltf" {
+                    posed.set(shape, "times", Value::String(times.clone()));
+                }
             }
         }
         Ok(posed)
@@ -706,10 +705,17 @@ impl<'a> Series<'a> {
         {
             return Ok((options, description));
         }
-        let (budget, session) = (&self.budget, &mut self.session);
         let turns = self.arguments.turntable.is_some();
+        let shutter = self.arguments.image.shutter(item.frame.unwrap_or(0));
+        let deforms = self
+            .moments(item, shutter)?
+            .is_some_and(|times| times.contains(','));
         let (arguments, up) = (&self.arguments.staging, scene.up_axis());
-        let staging = arguments.staging(up, self.arguments.image.overrides().size, turns);
+        let staging = Staging {
+            deforms,
+            ..arguments.staging(up, self.arguments.image.overrides().size, turns)
+        };
+        let (budget, session) = (&self.budget, &mut self.session);
         let (mut description, text) =
             scene.describe_staged(&item.input, &staging, &options, budget, session)?;
         if let (Some(path), Some(text)) = (&arguments.write_scene, text) {

@@ -15,7 +15,7 @@ pub(super) struct StagingArguments {
     /// Let the camera stand so many degrees to the right of the front, by default 27
     #[arg(long, value_name = "DEGREES", value_parser = degrees::<360>, allow_hyphen_values = true, help_heading = BARE)]
     azimuth: Option<f32>,
-    /// And so many above the horizon, by default 19
+    /// And so many above the horizon, by default 19; from below there is no ground
     #[arg(long, value_name = "DEGREES", value_parser = degrees::<90>, allow_hyphen_values = true, help_heading = BARE)]
     elevation: Option<f32>,
     /// So many times as far away as where the mesh fills the image
@@ -29,14 +29,15 @@ pub(super) struct StagingArguments {
     target: Option<DVec3>,
     /// What the mesh is made of: "clay" (matte), "metal" (rough) or "plastic" (glossy) in the mesh's own colours where it has
     /// any, "glass" (clear), the one material of a scene file (.xml), or matte with an image as its base colour; "auto" is
-    /// what the file's own materials say without their textures (glTF), or else clay
+    /// what the file's own materials say with their images (glTF, OBJ, PLY), or else clay
     #[arg(long, default_value = "auto", value_name = "NAME|FILE", value_parser = material, help_heading = BARE)]
     material: Finish,
     /// What lights it: "studio", "sun", "sky", or an image of all around by longitude and latitude; "auto" is the file's own
     /// lights (glTF, in candela and lux: a radiance of 1 is 1 cd/m²) and nothing else, or else the studio
     #[arg(long, default_value = "auto", value_name = "NAME|IMAGE", value_parser = lighting, help_heading = BARE)]
     light: Lighting,
-    /// What is seen beside it: "sky", a radiance such as 1,1,1, or "transparent", which leaves out the ground too
+    /// What is seen beside it: "sky", a radiance such as 1,1,1, which lights it in place of the sky, or "transparent", which
+    /// leaves out the ground too
     #[arg(long, default_value = "sky", value_name = "R,G,B|transparent", value_parser = background, help_heading = BARE)]
     background: Background,
     /// Let it float
@@ -87,6 +88,7 @@ impl StagingArguments {
             lighting: self.light.clone(),
             background: self.background,
             ground: !self.no_ground,
+            deforms: false,
         }
     }
 }

@@ -41,10 +41,10 @@ impl Aces {
     /// Display-referred linear BT.709 in [0, 1].
     pub(super) fn view(&self, rgb: [f32; 3]) -> [f32; 3] {
         let finite = rgb.map(|v| {
-            if v.is_finite() {
-                f64::from(v.clamp(-65504.0, 65504.0))
-            } else {
+            if v.is_nan() {
                 0.0
+            } else {
+                f64::from(v.clamp(-65504.0, 65504.0))
             }
         });
         let aces = self.from_bt709 * DVec3::from(finite);

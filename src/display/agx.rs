@@ -1,7 +1,8 @@
-//! AgX, Troy Sobotka's view of scene-referred light (github.com/sobotka/AgX, 2022): the primaries are drawn toward
-//! grey, so that bright saturated colours go to white instead of to a corner; a curve over 16.5 stops, from 10 below to
-//! 6.5 above middle grey, has slope 2 in the middle; the primaries go back. The matrix is that of Benjamin Wrensch's
-//! *Minimal AgX implementation* (2023), and the curve the one that his polynomials approximate.
+//! AgX as Benjamin Wrensch's *Minimal AgX implementation* (2023) has it, after Troy Sobotka's view of scene-referred light
+//! (github.com/sobotka/AgX, 2022): the primaries are drawn toward grey, so that bright saturated colours go to white instead of
+//! to a corner; a curve over 16.5 stops, from 10 below to 6.5 above middle grey, has slope 2 in the middle; the primaries go
+//! back, which in Sobotka's configuration they do not: its colours are paler, its greys and the curve are the same. The curve
+//! is the one that Wrensch's polynomials approximate.
 
 use glam::{DMat3, DVec3};
 

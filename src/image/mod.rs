@@ -71,17 +71,31 @@ pub fn read(path: &Path, account: &Account) -> Result<Picture> {
     if !there.is_file() {
         return Err(Error::input(format!("{} is not a file", path.display())));
     }
-    let place = Location::of_file(path);
-    account.take(there.len()).map_err(|e| e.at(&place))?;
+    let taken = account.take(there.len());
+    taken.map_err(|e| e.at(&Location::of_file(path)))?;
     let mut bytes = Vec::new();
     let file = file::open(path).map_err(refused)?;
     // A file that grows meanwhile is read as long as it was.
     (file.take(there.len()).read_to_end(&mut bytes)).map_err(refused)?;
-    let mut picture = decode(path, &bytes, account).map_err(|e| e.at(&place))?;
+    read_bytes(path, &bytes, account)
+}
+
+/// As [`read`], of an image whose bytes stand in the file `path`.
+///
+/// # Errors
+/// Where they are no image, damaged, cut off or larger than the budget allows.
+pub fn read_bytes(path: &Path, bytes: &[u8], account: &Account) -> Result<Picture> {
+    let place = Location::of_file(path);
+    let mut picture = decode(path, bytes, account).map_err(|e| e.at(&place))?;
     for warning in &mut picture.warnings {
         warning.location.get_or_insert_with(|| place.clone());
     }
     Ok(picture)
+}
+
+/// Whether these first bytes of the file `path` are those of an image of a known format.
+pub fn is_image(path: &Path, bytes: &[u8]) -> bool {
+    Decoder::of_input(path, bytes).is_ok()
 }
 
 /// Decodes the bytes of an image file; `path` only tells TGA from what is no image.

@@ -18,7 +18,7 @@ use crate::description::declared::{Plugin, boolean, file, float};
 use crate::error::Result;
 use crate::interaction::Reference;
 use crate::lanes::{self, Ints as _, Lanes, Mask as _};
-use crate::texture::Picture;
+use crate::texture::{Picture, Wanted};
 
 /// An image of the surroundings.
 #[derive(Clone, Debug)]
@@ -63,7 +63,7 @@ impl<C: ColorModel> Envmap<C> {
         let path = properties.file("filename")?;
         let scale = properties.float("scale")?;
         let to_world = Rotation::of(properties)?;
-        let picture = Picture::read(&path, false, properties.budget())
+        let picture = Picture::read(&Wanted::colors(path), properties.budget())
             .map_err(|e| e.at(properties.location()))?;
         let picture = completed(picture);
         let [width, height] = picture.size;

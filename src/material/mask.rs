@@ -1,11 +1,11 @@
-//! `mask`: the nested material with probability `opacity` (0.5; clamped to [0, 1]), nothing otherwise.
+//! `mask`: the nested material with probability `opacity` (0.5; clamped to [0, 1]), nothing otherwise. With Étendue's own
+//! `cutoff` there is nothing where the opacity is below that, and all of the material elsewhere.
 
 use super::{
-    BlockBsdf, Bsdf, BsdfSamples, BsdfValues, Lobes, Material, PhongTerms, fraction, nested,
-    single_face,
+    BlockBsdf, Bsdf, BsdfSamples, BsdfValues, Lobes, Material, PhongTerms, nested, single_face,
 };
 use crate::color::{ColorModel, Mono, Spectra};
-use crate::description::declared::{Plugin, nested as nested_row, number};
+use crate::description::declared::{Plugin, float, nested as nested_row, number};
 use crate::description::{Kind, Properties};
 use crate::error::Result;
 use crate::interaction::{Interaction, Points};
@@ -16,6 +16,7 @@ use crate::texture::{Palettes, Texture};
 #[derive(Clone, Debug)]
 pub struct Mask<C: ColorModel> {
     opacity: Texture<Mono>,
+    cutoff: Option<f32>,
     nested: Box<Material<C>>,
 }
 
@@ -28,6 +29,13 @@ impl<C: ColorModel> Mask<C> {
                 0.5,
                 "the share of light that meets the material, clamped to [0, 1]",
             ),
+            float(
+                "cutoff",
+                0.5,
+                "the opacity below which there is nothing, and all from there on",
+            )
+            .absent("as much as the opacity says")
+            .own(),
             nested_row(Kind::Bsdf, "the material"),
         ]],
     };
@@ -36,8 +44,23 @@ impl<C: ColorModel> Mask<C> {
         let mut nested = nested(properties, palettes, 1..=1)?;
         Ok(Self {
             opacity: palettes.numbers.number(properties, "opacity")?,
+            cutoff: properties
+                .given::<f64>("cutoff")?
+                .map(|cutoff| cutoff as f32),
             nested: Box::new(nested.remove(0)),
         })
+    }
+}
+
+impl<C: ColorModel> Mask<C> {
+    /// The share of light that meets the material.
+    #[inline(always)]
+    fn opacity<F: Lanes>(&self, at: &Points<'_, F>) -> F {
+        let opacity = self.opacity.numbers(at);
+        match self.cutoff {
+            Some(cutoff) => F::select(opacity.lt(F::splat(cutoff)), F::zero(), F::one()),
+            None => opacity.clamp(0.0, 1.0),
+        }
     }
 }
 
@@ -56,7 +79,7 @@ impl<C: ColorModel> Bsdf<C> for Mask<C> {
     single_face!();
 
     fn ambient(&self, at: &Interaction<'_>, wi: glam::Vec3, w: &C::Wavelengths) -> C::Sample {
-        self.nested.ambient(at, wi, w) * fraction(&self.opacity, at)
+        self.nested.ambient(at, wi, w) * self.opacity::<f32>(&Points::one(at))
     }
 }
 
@@ -69,7 +92,7 @@ impl<C: ColorModel> BlockBsdf<C> for Mask<C> {
         wo: Vec3<F>,
         w: &[C::Wavelengths],
     ) -> BsdfValues<F, C::Columns<F>> {
-        let opacity = self.opacity.numbers(at).clamp(0.0, 1.0);
+        let opacity = self.opacity(at);
         let values = self.nested.eval_lanes(at, wi, wo, w);
         BsdfValues {
             value: values.value * opacity,
@@ -84,7 +107,7 @@ impl<C: ColorModel> BlockBsdf<C> for Mask<C> {
         wi: Vec3<F>,
         w: &[C::Wavelengths],
     ) -> BsdfValues<F, C::Columns<F>> {
-        let opacity = self.opacity.numbers(at).clamp(0.0, 1.0);
+        let opacity = self.opacity(at);
         let all = BsdfValues {
             value: C::Columns::<F>::splat(F::one()),
             pdf: F::one(),
@@ -102,7 +125,7 @@ impl<C: ColorModel> BlockBsdf<C> for Mask<C> {
         u2: Vec2<F>,
         w: &[C::Wavelengths],
     ) -> BsdfSamples<F, C::Columns<F>> {
-        let opacity = self.opacity.numbers(at).clamp(0.0, 1.0);
+        let opacity = self.opacity(at);
         let met = u1.lt(opacity);
         let one = C::Columns::<F>::splat(F::one());
         let passing = BsdfSamples::passing(wi, F::one() - opacity, one);
@@ -125,7 +148,7 @@ impl<C: ColorModel> BlockBsdf<C> for Mask<C> {
         wo: Vec3<F>,
         w: &[C::Wavelengths],
     ) -> Option<PhongTerms<C::Columns<F>>> {
-        let opacity = self.opacity.numbers(at).clamp(0.0, 1.0);
+        let opacity = self.opacity(at);
         let terms = self.nested.phong_lanes(at, wi, wo, w);
         Some(terms.weighted(opacity))
     }

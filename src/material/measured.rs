@@ -1,7 +1,8 @@
 //! `measured`: a material as a gonio-photometer has seen it, from the tensor files of EPFL's Realistic Graphics Lab
 //! (Dupuy and Jakob, *An adaptive parameterization for efficient material acquisition and rendering*, 2018). Half vectors
 //! are drawn as the file's microfacets are visible, and then as the file's luminance says; the value there is looked up
-//! where the two warps have come from. Files in RGB are read and rendered in RGB.
+//! where the two warps have come from. As in Mitsuba, files with `rgb` are rendered in RGB, and files with `spectra` in bands:
+//! between the file's wavelengths values go straight, beyond them they stay.
 
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 use std::sync::Arc;
@@ -21,8 +22,16 @@ use crate::texture::Palettes;
 #[derive(Clone, Debug)]
 pub struct Measured<C: ColorModel> {
     tables: Arc<Tables>,
-    /// What a unit of red, of green and of blue is.
-    basis: [C::Stored; 3],
+    channels: Channels<C>,
+}
+
+/// What the file's channels stand for.
+#[derive(Clone, Debug)]
+enum Channels<C: ColorModel> {
+    /// Red, green and blue, of each of which a unit is this.
+    Rgb([C::Stored; 3]),
+    /// Wavelengths: the function that is as large as they are, in nm.
+    Wavelengths(C::Stored),
 }
 
 #[derive(Debug)]
@@ -31,7 +40,8 @@ struct Tables {
     sigma: Warp2D,
     vndf: Warp2D,
     luminance: Warp2D,
-    rgb: Warp2D,
+    /// By channel: 0, 1 and 2, or wavelengths in nm.
+    values: Warp2D,
     isotropic: bool,
     /// How many parts of the circle of azimuths are alike.
     symmetry: u32,
@@ -39,17 +49,26 @@ struct Tables {
     jacobian: bool,
 }
 
-/// A value and the density of its direction.
-#[derive(Clone, Copy, Debug, Default)]
+/// What a pair of directions comes to.
+#[derive(Clone, Copy, Debug)]
 struct Seen {
-    rgb: [f32; 3],
+    /// The angles of the light's side.
+    incident: [f32; 2],
+    /// Where values are looked up.
+    place: Vec2<f32>,
+    /// What they are multiplied by.
+    scale: f32,
+    /// The density of the direction.
     pdf: f32,
 }
 
 impl<C: ColorModel> Measured<C> {
     pub(super) const PLUGIN: Plugin = Plugin {
-        about: "a material that was measured, in RGB",
-        properties: &[&[file("filename", "a tensor file (.bsdf) with values in RGB")]],
+        about: "a material that was measured",
+        properties: &[&[file(
+            "filename",
+            "a tensor file (.bsdf) with values in RGB, or at wavelengths",
+        )]],
     };
 
     pub(super) fn build(properties: &Properties<'_>, palettes: &Palettes<C>) -> Result<Self> {
@@ -57,39 +76,62 @@ impl<C: ColorModel> Measured<C> {
         let color = &palettes.colors.color;
         let tensors = TensorFile::read(&path, properties.budget())
             .map_err(|e| e.at(properties.location()))?;
-        let fails = |what: &str| format!("{}: measured materials {what}", path.display());
-        let unsupported = match (color.is_rgb(), tensors.has("rgb")) {
-            (true, true) => None,
-            (false, _) => Some("are rendered in RGB alone, and not in bands"),
-            (true, false) => Some("are read in RGB alone, and this one is spectral"),
+        let (is_rgb, name) = match color.is_rgb() {
+            true => (true, "rgb"),
+            false => (false, "spectra"),
         };
-        if let Some(what) = unsupported {
-            return Err(Error::unsupported(fails(what)).at(properties.location()));
+        if !tensors.has(name) {
+            let message = match is_rgb {
+                true => "the file has values at wavelengths, which are rendered in bands",
+                false => "the file has values in RGB, which are not rendered in bands",
+            };
+            let help = match is_rgb {
+                true => "`--bands N` renders it, or a file of the same material with values in RGB",
+                false => "the same material's file with values at wavelengths can be",
+            };
+            let message = format!("{}: {message}", path.display());
+            let error = Error::unsupported(message).at(properties.location());
+            return Err(error.help(help));
         }
-        let tables = Tables::new(tensors)
+        let tables = Tables::new(tensors, is_rgb)
             .map_err(|why| properties.error("filename", format!("{}: {why}", path.display())))?;
-        let units = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-        let [r, g, b] = units.map(|unit| color.store(&Color::Rgb(unit), Role::Quantity));
-        let stored = |unit: std::result::Result<C::Stored, String>| {
-            unit.map_err(|why| properties.error("filename", why))
+        let stored = |what: Color| {
+            let stored = color.store(&what, Role::Quantity);
+            stored.map_err(|why| properties.error("filename", why))
+        };
+        let channels = if is_rgb {
+            let [r, g, b] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+            let unit = |unit| stored(Color::Rgb(unit));
+            Channels::Rgb([unit(r)?, unit(g)?, unit(b)?])
+        } else {
+            let [low, high] = [1.0, 1e5];
+            Channels::Wavelengths(stored(Color::Curve(vec![(low, low), (high, high)]))?)
         };
         Ok(Self {
             tables: Arc::new(tables),
-            basis: [stored(r)?, stored(g)?, stored(b)?],
+            channels,
         })
     }
 
-    fn color(&self, rgb: [f32; 3], w: &C::Wavelengths) -> C::Sample {
-        let mut sum = C::Sample::zero();
-        for (stored, value) in self.basis.iter().zip(rgb) {
-            sum += C::evaluate(stored, w) * value;
+    fn color(&self, seen: &Seen, w: &C::Wavelengths) -> C::Sample {
+        match &self.channels {
+            Channels::Rgb(units) => {
+                let mut sum = C::Sample::zero();
+                for (unit, channel) in units.iter().zip([0.0, 1.0, 2.0]) {
+                    sum += C::evaluate(unit, w) * self.tables.value(seen, channel);
+                }
+                sum
+            }
+            Channels::Wavelengths(identity) => {
+                let wavelengths = C::evaluate(identity, w);
+                C::Sample::from_fn(|channel| self.tables.value(seen, wavelengths[channel]))
+            }
         }
-        sum
     }
 }
 
 impl Tables {
-    fn new(mut file: TensorFile) -> std::result::Result<Self, String> {
+    fn new(mut file: TensorFile, is_rgb: bool) -> std::result::Result<Self, String> {
         let ascending = |name: &str, file: &mut TensorFile| {
             let values = file.array(name, 1)?.values;
             match values.windows(2).all(|pair| pair[0] < pair[1]) {
@@ -125,15 +167,19 @@ impl Tables {
         let vndf = Warp2D::density(size, parameters(), values);
         let (size, values) = grid("luminance", &outer, &mut file)?;
         let luminance = Warp2D::density(size, parameters(), values);
-        let Array { shape, values } = file.array("rgb", 5)?;
-        let [phis, thetas, channels, height, width] = shape[..] else {
-            return Err("rgb has no five dimensions".to_owned());
+        let (name, channel_values) = match is_rgb {
+            true => ("rgb", vec![0.0, 1.0, 2.0]),
+            false => ("spectra", ascending("wavelengths", &mut file)?),
         };
-        if [phis, thetas] != outer || channels != 3 || [width, height] != size {
-            return Err("rgb is of another size than luminance".to_owned());
+        let Array { shape, values } = file.array(name, 5)?;
+        let [phis, thetas, channels, height, width] = shape[..] else {
+            return Err(format!("{name} has no five dimensions"));
+        };
+        if [phis, thetas] != outer || channels != channel_values.len() || [width, height] != size {
+            return Err(format!("{name} is of another size than luminance"));
         }
         let mut by_channel = parameters();
-        by_channel.push(vec![0.0, 1.0, 2.0]);
+        by_channel.push(channel_values);
         let jacobian = file.array("jacobian", 1)?.values[0] != 0.0;
         let reach = phi[phi.len() - 1] - phi[0];
         let isotropic = phi.len() <= 2;
@@ -142,7 +188,7 @@ impl Tables {
             sigma,
             vndf,
             luminance,
-            rgb: Warp2D::table(size, by_channel, values),
+            values: Warp2D::table(size, by_channel, values),
             isotropic,
             // Half vectors of isotropic materials are told from the plane of incidence, so that to turn a pair of
             // directions changes no more than where `sigma` is looked up. Mitsuba 3.9.1 looks there.
@@ -165,10 +211,10 @@ impl Tables {
         }
     }
 
-    /// The value and the density of a pair of directions above the surface.
-    fn eval(&self, wi: Vec3<f32>, wo: Vec3<f32>) -> Seen {
+    /// What a pair of directions comes to; `None` unless they are above the surface.
+    fn eval(&self, wi: Vec3<f32>, wo: Vec3<f32>) -> Option<Seen> {
         if wi.z <= 0.0 || wo.z <= 0.0 {
-            return Seen::default();
+            return None;
         }
         let [sx, sy] = self.fold(wi);
         let turned = |v: Vec3<f32>| Vec3::new(v.x * sx, v.y * sy, v.z);
@@ -192,18 +238,22 @@ impl Tables {
             let none = self.ndf.mix(&[]);
             scale = self.ndf.eval(&none, u_m) / (4.0 * self.sigma.eval(&none, u_wi));
         }
-        let value = |channel: f32| {
-            let mix = self.rgb.mix(&[phi_i, theta_i, channel]);
-            scale * self.rgb.eval(&mix, visible.place)
-        };
+        let pdf = visible.density * bright / jacobian;
         let seen = Seen {
-            rgb: [value(0.0), value(1.0), value(2.0)],
-            pdf: visible.density * bright / jacobian,
+            incident: [phi_i, theta_i],
+            place: visible.place,
+            scale,
+            pdf,
         };
-        match seen.pdf.is_finite() && seen.rgb.iter().all(|v| v.is_finite()) {
-            true => seen,
-            false => Seen::default(),
-        }
+        (pdf.is_finite() && scale.is_finite()).then_some(seen)
+    }
+
+    /// The value of a channel; 0 where it is no number.
+    fn value(&self, seen: &Seen, channel: f32) -> f32 {
+        let [phi_i, theta_i] = seen.incident;
+        let mix = self.values.mix(&[phi_i, theta_i, channel]);
+        let value = seen.scale * self.values.eval(&mix, seen.place);
+        if value.is_finite() { value } else { 0.0 }
     }
 
     /// A direction, which may be below the surface.
@@ -262,9 +312,16 @@ impl<C: ColorModel> BlockBsdf<C> for Measured<C> {
         let (wi, wo) = (wi.rows(), wo.rows());
         let value = Spectra::from_samples(|lane| {
             let (wi, wo) = (Vec3::<F>::of(&wi, lane), Vec3::<F>::of(&wo, lane));
-            let seen = self.tables.eval(wi.into(), wo.into());
-            pdf[lane] = seen.pdf;
-            self.color(seen.rgb, &w[lane])
+            match self.tables.eval(wi.into(), wo.into()) {
+                Some(seen) => {
+                    pdf[lane] = seen.pdf;
+                    self.color(&seen, &w[lane])
+                }
+                None => {
+                    pdf[lane] = 0.0;
+                    C::Sample::zero()
+                }
+            }
         });
         BsdfValues {
             value,

@@ -6,7 +6,7 @@ use std::sync::LazyLock;
 use glam::{Vec2, Vec3};
 
 use super::*;
-use crate::color::{Rgb, Samples, Spectra};
+use crate::color::{Bands, Color, Rgb, Role, Samples, Spectra};
 use crate::description::{Description, Options};
 use crate::interaction::{Points, Source};
 use crate::lanes::{self, Kernel, Lanes, Mask as _, Task, warp};
@@ -190,6 +190,12 @@ static FILES: LazyLock<tempfile::TempDir> = LazyLock::new(|| {
                 &[phis, thetas, 3, 4, 4],
                 numbers(outer * 48, 5, 0.02, 0.1),
             ),
+            (
+                "spectra",
+                &[phis, thetas, 3, 4, 4],
+                numbers(outer * 48, 5, 0.02, 0.1),
+            ),
+            ("wavelengths", &[3], vec![450.0, 550.0, 650.0]),
             ("description*", &[4], vec![109.0; 4]),
             ("jacobian*", &[1], vec![0.0]),
         ]);
@@ -606,6 +612,14 @@ const VARYING: &[(&str, &str)] = &[
         r#"<bsdf type="bumpmap"><float name="scale" value="0.2"/><texture type="zoneplate"/><bsdf type="roughdielectric"><texture name="alpha" type="zoneplate"/></bsdf></bsdf>"#,
     ),
     (
+        "mask",
+        r#"<bsdf type="mask"><float name="cutoff" value="0.3"/><texture name="opacity" type="zoneplate"/><bsdf type="diffuse"/></bsdf>"#,
+    ),
+    (
+        "normalmap",
+        r#"<bsdf type="normalmap"><float name="scale" value="0.4"/><boolean name="against_v" value="true"/><texture name="normalmap" type="zoneplate"/><bsdf type="plastic"/></bsdf>"#,
+    ),
+    (
         "normalmap",
         r#"<bsdf type="normalmap"><boolean name="flip_invalid_normals" value="false"/><boolean name="use_shadowing_function" value="false"/><texture name="normalmap" type="checkerboard"/><bsdf type="plastic"/></bsdf>"#,
     ),
@@ -811,6 +825,44 @@ fn a_block_is_told_what_its_points_are_told_one_by_one() {
                     questions[i]
                 );
             }
+        }
+    }
+}
+
+/// The files hold the same numbers as red, green and blue and at three wavelengths.
+#[test]
+fn what_was_measured_goes_straight_between_wavelengths_and_stays_beyond_them() {
+    let bands = Bands::<8>::visible(8).unwrap();
+    let identity = Color::Curve(vec![(100.0, 100.0), (2000.0, 2000.0)]);
+    let identity = bands.store(&identity, Role::Quantity).unwrap();
+    for (_, text) in MATERIALS.iter().filter(|(name, _)| *name == "measured") {
+        let text = format!(r#"<scene version="3.0.0">{text}</scene>"#);
+        let path = FILES.path().join("test.xml");
+        let scene = Description::parse(&text, &path, &Options::default()).unwrap();
+        let node = scene.root().children(Kind::Bsdf)[0];
+        let in_rgb = Material::build(&node, &Palettes::new(Rgb)).unwrap();
+        let in_bands = Material::build(&node, &Palettes::new(bands.clone())).unwrap();
+        for i in 0..50 {
+            let (u, v) = (uniforms(i), uniforms(1000 + i));
+            let [wi, wo] = [u.1, v.1].map(|u| Vec3::from(warp::cosine_hemisphere(u.into())));
+            let w = bands.wavelengths(|| u.0);
+            let expected = in_rgb.eval(&interaction(), wi, wo, &()).unwrap().value;
+            let found = in_bands.eval(&interaction(), wi, wo, &w).unwrap().value;
+            let nm = Bands::<8>::evaluate(&identity, &w);
+            for band in 0..8 {
+                let place = ((nm[band] - 450.0) / 100.0).clamp(0.0, 2.0);
+                let low = (place as usize).min(1);
+                let part = place - low as f32;
+                let expected = expected[low] * (1.0 - part) + expected[low + 1] * part;
+                let error = (found[band] - expected).abs();
+                assert!(
+                    error < 1e-4 * expected.max(1e-3),
+                    "{} nm: {} {expected}",
+                    nm[band],
+                    found[band]
+                );
+            }
+            assert!((380.0..=780.0).contains(&nm[3]), "{}", nm[3]);
         }
     }
 }

@@ -23,9 +23,11 @@ mod polygon;
 mod read;
 mod refine;
 mod report;
+mod select;
 mod serialized;
 mod source;
 mod stl;
+mod surface;
 #[cfg(test)]
 mod tests;
 mod weld;
@@ -39,8 +41,8 @@ pub use generate::{
     menger, menger_triangles, rectangle, sphere, terrain,
 };
 pub use gltf::{
-    GltfCamera, GltfLight, GltfLightKind, GltfPart, GltfScene, GltfSetting, GltfSurface,
-    Projection, gltf_is_animated, read_gltf, read_gltf_setting,
+    GltfCamera, GltfLight, GltfLightKind, GltfPart, GltfScene, GltfSetting, Projection, gltf_image,
+    gltf_is_animated, read_gltf, read_gltf_setting,
 };
 pub use mtl::BARE_COLOR;
 pub use parts::{Part, Parts, read_parts};
@@ -50,6 +52,7 @@ pub use read::{FORMATS, Format, Loaded, MeshFile, ReadMesh, ReadOptions, Time, e
 pub(crate) use read::{contents, is_compressed};
 pub use refine::TooMany;
 pub use report::Report;
+pub use surface::{Map, Maps, Surface};
 
 /// Triangles over shared vertices.
 #[derive(Clone, Debug, Default, PartialEq)]

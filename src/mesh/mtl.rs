@@ -1,13 +1,18 @@
 //! Wavefront MTL, as far as a mesh shows it: the diffuse colour `Kd` of each `newmtl`, taken as linear RGB,
-//! which is what Mitsuba 0.6 took it for. A material that stands in several libraries is that of the first,
-//! as the format's specification has it. A library that cannot be read is worth a warning, not an error: the
-//! mesh is there without it.
+//! which is what Mitsuba 0.6 took it for; of a file that is all there is also the images `map_Kd`, `map_d`, `map_Ke` and
+//! `norm`, the opacity `d`, the emission `Ke`, and roughness and metal (`Pr`, `Pm` and their maps, an extension that modelling
+//! programs write). An image is scaled and moved by `-s` and `-o` and clamped by `-clamp on`; other options are passed over. A
+//! material that stands in several libraries is that of the first, as the format's specification has it. A library that
+//! cannot be read is worth a warning, not an error: the mesh is there without it.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
+use glam::{Mat3, Vec2};
+
+use super::surface::{Map, Surface};
 use crate::file::text;
 
 /// The linear RGB reflectance of what has no colour of its own, in a mesh where other faces have, and of a
@@ -22,24 +27,37 @@ const MOST_LIBRARIES: usize = 64;
 /// The materials of all libraries of a mesh.
 #[derive(Debug, Default)]
 pub(super) struct Materials {
-    /// By name; `None`: without a colour that can be shown.
-    colors: HashMap<Vec<u8>, Option<[f32; 3]>>,
+    materials: HashMap<Vec<u8>, Material>,
     /// What was odd, in words.
     pub(super) warnings: Vec<String>,
     /// Libraries read or tried.
     pub(super) libraries: Vec<PathBuf>,
-    /// Whether a material has a picture for its colour.
-    textured: bool,
+    /// Whether more than colours is wanted.
+    whole: bool,
+    /// The words of what is not shown.
+    unseen: BTreeSet<&'static str>,
     /// Materials beyond [`MOST_MATERIALS`].
     left_out: usize,
-    /// `Kd` lines that say no colour.
+    /// Lines that do not say what they should.
     unusable: usize,
 }
 
+/// What is shown of a material.
+#[derive(Clone, Debug, PartialEq)]
+struct Material {
+    /// `None`: without a colour that can be shown.
+    color: Option<[f32; 3]>,
+    surface: Surface,
+}
+
 impl Materials {
-    /// Reads the libraries that the `mtllib` lines of the file `mesh` name: `named` is what follows the word.
-    pub(super) fn read(mesh: &Path, named: &[Vec<u8>]) -> Self {
-        let mut materials = Self::default();
+    /// Reads the libraries that the `mtllib` lines of the file `mesh` name: `named` is what follows the word. Of a file that
+    /// is the `whole` of what is there, more than colours is wanted.
+    pub(super) fn read(mesh: &Path, named: &[Vec<u8>], whole: bool) -> Self {
+        let mut materials = Self {
+            whole,
+            ..Self::default()
+        };
         let folder = mesh.parent().unwrap_or(Path::new(""));
         for line in named {
             let line = String::from_utf8_lossy(line).replace('\\', "/");
@@ -59,12 +77,24 @@ impl Materials {
 
     /// The colour of the material called `name`; `None` where there is no such material or it has none.
     pub(super) fn color(&self, name: &[u8]) -> Option<[f32; 3]> {
-        self.colors.get(name).copied().flatten()
+        let Material { color, surface } = self.materials.get(name)?;
+        // Many programs write no colour, or black, where an image has the say.
+        let textured = surface.maps.color.is_some();
+        match color {
+            None | Some([0.0, 0.0, 0.0]) if textured => Some([1.0; 3]),
+            color => *color,
+        }
+    }
+
+    /// The rest of it; matte where there is no such material.
+    pub(super) fn surface(&self, name: &[u8]) -> Surface {
+        let known = self.materials.get(name);
+        known.map_or(Surface::MATTE, |material| material.surface.clone())
     }
 
     /// Whether there is a material called `name`.
     pub(super) fn has(&self, name: &[u8]) -> bool {
-        self.colors.contains_key(name)
+        self.materials.contains_key(name)
     }
 
     fn library(&mut self, path: PathBuf) {
@@ -77,7 +107,7 @@ impl Materials {
             ));
         } else {
             match bytes(&path) {
-                Ok(bytes) => self.parse(&bytes),
+                Ok(bytes) => self.parse(&bytes, path.parent().unwrap_or(Path::new(""))),
                 Err(why) => self.warnings.push(format!(
                     "the material library {} cannot be read: {why}",
                     path.display()
@@ -87,46 +117,107 @@ impl Materials {
         self.libraries.push(path);
     }
 
-    fn parse(&mut self, bytes: &[u8]) {
+    fn parse(&mut self, bytes: &[u8], folder: &Path) {
         let mut current = None;
         for line in text::lines(bytes) {
             let (keyword, rest) = keyword(line);
-            match keyword.to_ascii_lowercase().as_slice() {
-                b"newmtl" => {
-                    self.keep(current.take());
-                    current = Some((rest.to_vec(), None));
-                }
-                b"kd" => match (&mut current, color(rest)) {
-                    (Some((_, color)), Some(said)) => *color = Some(said),
-                    _ => self.unusable += 1,
-                },
-                b"map_kd" => self.textured = true,
-                _ => {}
+            let keyword = keyword.to_ascii_lowercase();
+            if keyword == b"newmtl" {
+                self.keep(current.take());
+                let empty = Material {
+                    color: None,
+                    surface: Surface::MATTE,
+                };
+                current = Some((rest.to_vec(), empty));
+                continue;
             }
+            let material = current.as_mut().map(|(_, material)| material);
+            let understood = if keyword == b"kd" {
+                let said = color(rest);
+                material
+                    .zip(said)
+                    .map(|(material, said)| material.color = Some(said))
+            } else if self.whole {
+                self.rest(&keyword, rest, folder, material)
+            } else {
+                if keyword == b"map_kd" {
+                    self.unseen.insert("map_Kd");
+                }
+                Some(())
+            };
+            self.unusable += usize::from(understood.is_none());
         }
         self.keep(current);
     }
 
-    fn keep(&mut self, material: Option<(Vec<u8>, Option<[f32; 3]>)>) {
-        let Some((name, color)) = material else {
+    /// A line that says more than a colour; `None` where it does not say it right.
+    fn rest(
+        &mut self,
+        keyword: &[u8],
+        rest: &[u8],
+        folder: &Path,
+        material: Option<&mut Material>,
+    ) -> Option<()> {
+        const UNSEEN: [(&[u8], &str); 9] = [
+            (b"map_bump", "map_Bump"),
+            (b"bump", "map_Bump"),
+            (b"disp", "disp"),
+            (b"map_ks", "map_Ks"),
+            (b"map_ns", "map_Ns"),
+            (b"refl", "refl"),
+            (b"decal", "decal"),
+            (b"tf", "Tf"),
+            (b"map_tr", "map_Tr"),
+        ];
+        let unseen = UNSEEN.iter().filter(|(word, _)| *word == keyword);
+        self.unseen.extend(unseen.map(|(_, name)| name));
+        let number = || Some(color(rest)?[0]);
+        let mut unplaced = None;
+        let surface = match material {
+            Some(material) => &mut material.surface,
+            None => unplaced.insert(Surface::MATTE),
+        };
+        let maps = &mut surface.maps;
+        match keyword {
+            b"d" => surface.opacity = number()?,
+            b"pr" => surface.roughness = number()?,
+            b"pm" => surface.metallic = number()?,
+            b"ke" => surface.emission = emission(rest)?,
+            b"map_kd" => maps.color = Some(map(rest, folder)?),
+            b"map_ke" => maps.emission = Some(map(rest, folder)?),
+            b"map_d" => maps.opacity = Some(map(rest, folder)?),
+            b"map_pr" => maps.roughness = Some(map(rest, folder)?.by("r")),
+            b"map_pm" => maps.metallic = Some(map(rest, folder)?.by("r")),
+            b"norm" => maps.normal = Some(map(rest, folder)?),
+            _ => return Some(()),
+        }
+        // What stands before the first material is nobody's.
+        unplaced.is_none().then_some(())
+    }
+
+    fn keep(&mut self, material: Option<(Vec<u8>, Material)>) {
+        let Some((name, mut material)) = material else {
             return;
         };
-        if self.colors.len() < MOST_MATERIALS {
-            self.colors.entry(name).or_insert(color);
-        } else if !self.colors.contains_key(&name) {
+        material.complete();
+        if self.materials.len() < MOST_MATERIALS {
+            self.materials.entry(name).or_insert(material);
+        } else if !self.materials.contains_key(&name) {
             self.left_out += 1;
         }
     }
 
     fn summarize(&mut self) {
-        if self.textured {
-            let message = "map_Kd is not shown: faces have the colour Kd of their material";
-            self.warnings.push(message.to_owned());
+        if !self.unseen.is_empty() {
+            let names: Vec<&str> = self.unseen.iter().copied().collect();
+            let names = names.join(", ");
+            self.warnings
+                .push(format!("not shown of the materials: {names}"));
         }
         for (count, what) in [
             (
                 self.unusable,
-                "lines Kd passed over: wanted is a material's one or three numbers from 0 to 1",
+                "lines passed over: wanted is a material's one or three numbers from 0 to 1, or an image",
             ),
             (
                 self.left_out,
@@ -140,6 +231,93 @@ impl Materials {
     }
 }
 
+impl Material {
+    /// Takes what one line says together with what others do.
+    fn complete(&mut self) {
+        let Surface {
+            emission,
+            opacity,
+            maps,
+            metallic,
+            roughness,
+            ..
+        } = &mut self.surface;
+        if let Some(map) = &mut maps.opacity {
+            // Where it is the colours' image, it is that one's opacity that is meant.
+            let of_colors = maps.color.as_ref().is_some_and(|c| c.path == map.path);
+            map.channel = if of_colors { "a" } else { "r" };
+        }
+        if maps.emission.is_some() && *emission == [0.0; 3] {
+            *emission = [1.0; 3];
+        }
+        *emission = emission.map(|part| part * *opacity);
+        if maps.metallic.is_some() && *metallic == 0.0 {
+            *metallic = 1.0;
+        }
+        if maps.roughness.is_some() && *roughness == 0.0 {
+            *roughness = 1.0;
+        }
+    }
+}
+
+/// An image, after its options: scale and offset of texture coordinates that run from the bottom, and what is beyond the
+/// edge.
+fn map(text: &[u8], folder: &Path) -> Option<Map> {
+    let text = std::str::from_utf8(text).ok()?;
+    let (mut scale, mut offset) = (Vec2::ONE, Vec2::ZERO);
+    let mut wrap = ["repeat"; 2];
+    let mut rest = text.trim();
+    while let Some(option) = rest.strip_prefix('-') {
+        let (name, after) = option.split_once(|c: char| c.is_ascii_whitespace())?;
+        rest = after.trim_start();
+        // One to three numbers, or a word; the last word is the image.
+        let mut words = Vec::new();
+        let most = match name {
+            "s" | "o" | "t" => 3,
+            "mm" => 2,
+            _ => 1,
+        };
+        while words.len() < most {
+            let Some((word, after)) = rest.split_once(|c: char| c.is_ascii_whitespace()) else {
+                break;
+            };
+            if !words.is_empty() && word.parse::<f32>().is_err() {
+                break;
+            }
+            words.push(word);
+            rest = after.trim_start();
+        }
+        if words.is_empty() {
+            return None;
+        }
+        let number = |place: usize, other: f32| match words.get(place) {
+            None => Some(other),
+            Some(word) => word.parse().ok().filter(|number: &f32| number.is_finite()),
+        };
+        match name {
+            "s" => scale = Vec2::new(number(0, 1.0)?, number(1, 1.0)?),
+            "o" => offset = Vec2::new(number(0, 0.0)?, number(1, 0.0)?),
+            "clamp" if words == ["on"] => wrap = ["clamp"; 2],
+            _ => {}
+        }
+    }
+    if rest.is_empty() {
+        return None;
+    }
+    let path = folder.join(rest.replace('\\', "/"));
+    // The mesh's run from the top.
+    let moved = Vec2::new(offset.x, 1.0 - scale.y - offset.y);
+    let to_uv = Mat3::from_translation(moved) * Mat3::from_scale(scale);
+    if !to_uv.is_finite() {
+        return None;
+    }
+    Some(Map {
+        wrap,
+        to_uv,
+        ..Map::of(path)
+    })
+}
+
 /// The first word of `line`, and the rest without blanks around it.
 pub(super) fn keyword(line: &[u8]) -> (&[u8], &[u8]) {
     let line = line.trim_ascii();
@@ -148,13 +326,23 @@ pub(super) fn keyword(line: &[u8]) -> (&[u8], &[u8]) {
     (keyword, rest.trim_ascii_start())
 }
 
-/// `r g b`, or one number for all three.
+/// A colour of numbers from 0 to 1.
 fn color(text: &[u8]) -> Option<[f32; 3]> {
+    numbers(text, 1.0)
+}
+
+/// A colour of light.
+fn emission(text: &[u8]) -> Option<[f32; 3]> {
+    numbers(text, f32::MAX)
+}
+
+/// `r g b`, or one number for all three, from 0 to `most`.
+fn numbers(text: &[u8], most: f32) -> Option<[f32; 3]> {
     let text = text.split(|&b| b == b'#').next()?;
     let mut numbers = std::str::from_utf8(text).ok()?.split_ascii_whitespace();
     let mut number = || -> Option<Option<f32>> {
         let word = numbers.next()?;
-        Some(word.parse().ok().filter(|v| (0.0..=1.0).contains(v)))
+        Some(word.parse().ok().filter(|v| (0.0..=most).contains(v)))
     };
     let red = number()??;
     let Some(green) = number() else {
@@ -185,8 +373,11 @@ mod tests {
     use super::*;
 
     fn parse(text: &[u8]) -> Materials {
-        let mut materials = Materials::default();
-        materials.parse(text);
+        let mut materials = Materials {
+            whole: true,
+            ..Materials::default()
+        };
+        materials.parse(text, Path::new("there"));
         materials.summarize();
         materials
     }
@@ -201,6 +392,57 @@ mod tests {
         assert_eq!(materials.color(b"two words"), Some([0.25; 3]));
         assert!(materials.has(b"none") && materials.color(b"none").is_none());
         assert!(!materials.has(b"two") && materials.warnings.is_empty());
+    }
+
+    #[test]
+    fn images_and_what_is_done_to_them_are_read_with_blanks_in_their_names() {
+        let materials = parse(
+            b"newmtl a\nKd 0 0 0\nmap_Kd -blendu on -s 2 4 1 -o .5 0.25 -clamp on my wood.png\nd 0.5\nKe 2 4 6\n\
+              map_d my wood.png\nnewmtl b\nPr 0.5\nPm 1\nmap_Pr sub\\\\r.png\nmap_Bump -bm 2 bump.png\nmap_d mask.png\n\
+              norm n.png\nmap_Ke e.png\nnewmtl c\nKd 0 0 0\nNs 10\n",
+        );
+        let of = |name: &str| Map::of(Path::new("there").join(name));
+        let Surface {
+            emission,
+            opacity,
+            maps,
+            ..
+        } = materials.surface(b"a");
+        // Half of the light of what is half there.
+        assert_eq!((emission, opacity), ([1.0, 2.0, 3.0], 0.5));
+        let wood = maps.color.unwrap();
+        assert_eq!(maps.opacity, Some(of("my wood.png").by("a")));
+        assert_eq!(
+            (wood.path.clone(), wood.wrap),
+            (of("my wood.png").path, ["clamp"; 2])
+        );
+        // Scaled and moved about the bottom, of coordinates that run from the top.
+        let uv = wood.to_uv.transform_point2(Vec2::new(0.25, 1.0));
+        assert_eq!(uv, Vec2::new(1.0, 0.75));
+        assert_eq!(materials.color(b"a"), Some([1.0; 3]));
+        let b = materials.surface(b"b");
+        assert_eq!((b.roughness, b.metallic, b.emission), (0.5, 1.0, [1.0; 3]));
+        assert_eq!(b.maps.roughness, Some(of("sub/r.png").by("r")));
+        assert_eq!(b.maps.opacity, Some(of("mask.png").by("r")));
+        assert_eq!(
+            (b.maps.normal, b.maps.emission),
+            (Some(of("n.png")), Some(of("e.png")))
+        );
+        assert_eq!(materials.surface(b"c"), Surface::MATTE);
+        assert_eq!(materials.color(b"c"), Some([0.0; 3]));
+        assert_eq!(materials.warnings, ["not shown of the materials: map_Bump"]);
+        for broken in [
+            "map_Kd",
+            "map_Kd -s 1",
+            "map_Kd -s a b.png",
+            "map_Kd -clamp on",
+            "d x",
+            "Ke -1",
+        ] {
+            let materials = parse(format!("newmtl a\n{broken}\n").as_bytes());
+            assert_eq!(materials.warnings.len(), 1, "{broken}");
+            assert_eq!(materials.surface(b"a"), Surface::MATTE, "{broken}");
+        }
     }
 
     #[test]
@@ -232,7 +474,7 @@ mod tests {
             .map(|i| format!("newmtl {i}\nKd 1\n"))
             .collect();
         let materials = parse(text.as_bytes());
-        assert_eq!(materials.colors.len(), MOST_MATERIALS);
+        assert_eq!(materials.materials.len(), MOST_MATERIALS);
         assert!(materials.warnings[0].starts_with("2 materials left out"));
 
         let folder = tempfile::tempdir().unwrap();
@@ -241,13 +483,13 @@ mod tests {
         std::fs::create_dir(folder.path().join("folder.mtl")).unwrap();
         let mesh = folder.path().join("mesh.obj");
         let named = [b"large.mtl folder.mtl large.mtl".to_vec()];
-        let warnings = Materials::read(&mesh, &named).warnings;
+        let warnings = Materials::read(&mesh, &named, true).warnings;
         assert_eq!(warnings.len(), 2);
         assert!(warnings[0].ends_with("larger than 16 MiB"));
         assert!(warnings[1].ends_with("no regular file"));
 
         let many: Vec<_> = (0..1000).map(|i| format!("{i}.mtl").into_bytes()).collect();
-        let warnings = Materials::read(&mesh, &many).warnings;
+        let warnings = Materials::read(&mesh, &many, true).warnings;
         assert_eq!(warnings.len(), MOST_LIBRARIES + 1);
     }
 }

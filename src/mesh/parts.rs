@@ -9,6 +9,8 @@ use super::far::Far;
 use super::read::{
     Decoded, Input, Loaded, ReadOptions, extension, read_near, read_on, warnings, with_input,
 };
+use super::select::{NOWHERE, select};
+use super::surface::FACE_SURFACE;
 use super::{Attribute, Mesh, Per, gltf, obj, serialized};
 use crate::budget::{Account, Budget};
 use crate::error::{Error, Location, Problem, Result};
@@ -152,6 +154,7 @@ fn obj_parts(path: &Path, account: &Account) -> Result<Parts> {
         Ok(decoded)
     })?;
     drop(bytes);
+    (loaded.mesh.attributes).retain(|attribute| attribute.name != FACE_SURFACE);
     let mut parts = Parts::default();
     if !is_split {
         parts.add(String::new(), loaded);
@@ -175,46 +178,6 @@ fn obj_parts(path: &Path, account: &Account) -> Result<Parts> {
     parts.dropped_triangles = loaded.dropped_triangles;
     parts.warnings = loaded.warnings;
     Ok(parts)
-}
-
-const NOWHERE: u32 = u32::MAX;
-
-/// The mesh of these triangles alone, its vertices in the order of their first use. `places` has [`NOWHERE`] for each
-/// vertex, before and after.
-fn select(mesh: &Mesh, triangles: &[u32], places: &mut [u32]) -> Mesh {
-    let mut vertices = Vec::new();
-    let mut part = Mesh::default();
-    for &triangle in triangles {
-        let corners = mesh.triangles[triangle as usize].map(|corner| {
-            let place = &mut places[corner as usize];
-            if *place == NOWHERE {
-                *place = vertices.len() as u32;
-                vertices.push(corner);
-            }
-            *place
-        });
-        part.triangles.push(corners);
-    }
-    for &vertex in &vertices {
-        places[vertex as usize] = NOWHERE;
-        let i = vertex as usize;
-        part.positions.push(mesh.positions[i]);
-        part.normals.extend(mesh.normals.get(i));
-        part.uvs.extend(mesh.uvs.get(i));
-    }
-    for attribute in &mesh.attributes {
-        let rows = match attribute.per {
-            Per::Vertex => &vertices,
-            Per::Face => triangles,
-        };
-        let rows = rows.iter().flat_map(|&i| attribute.row(i as usize));
-        part.attributes.push(Attribute {
-            values: rows.copied().collect(),
-            name: attribute.name.clone(),
-            ..*attribute
-        });
-    }
-    part
 }
 
 /// Which triangles of an OBJ file belong together.

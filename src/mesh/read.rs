@@ -11,6 +11,8 @@ use glam::DVec3;
 
 use super::far::Far;
 use super::polygon::Polygons;
+use super::select::{NOWHERE, select};
+use super::surface::{self, Surface};
 use super::{Mesh, Repairs, gltf, obj, ply, serialized, stl};
 use crate::budget::{Account, Budget};
 use crate::error::{Error, Location, Problem, Result};
@@ -74,6 +76,38 @@ pub struct Loaded {
     pub warnings: Vec<Problem>,
     /// The files that this one names and that were read for it, or tried: buffers of glTF, material libraries of OBJ.
     pub files: Vec<PathBuf>,
+    /// What its faces are made of, of a [bare](ReadOptions::bare) file that says so.
+    pub surfaces: Vec<Surface>,
+}
+
+impl Loaded {
+    /// The linear red, green and blue that all faces of this surface have, if they have one.
+    pub fn color_of(&self, number: usize) -> Option<[f32; 3]> {
+        match surface::faces(&self.mesh, number) {
+            Some(faces) => surface::color_of(&self.mesh, faces.into_iter()),
+            None => surface::color_of(&self.mesh, 0..self.mesh.triangles.len() as u32),
+        }
+    }
+
+    /// Bytes on the heap of a mesh of the faces that have this surface, about: its share of the whole.
+    pub fn room_of(&self, number: usize) -> u64 {
+        let all = self.mesh.triangles.len().max(1) as u64;
+        let faces = surface::faces(&self.mesh, number).map_or(all, |faces| faces.len() as u64);
+        // Vertices at the edges are there once more.
+        (self.mesh.room() / all + 64) * faces
+    }
+
+    /// The faces that have the surface of this number, as a mesh of their own; `None` where there is no such surface.
+    pub fn of_surface(&self, number: usize) -> Option<Mesh> {
+        if number >= self.surfaces.len() {
+            return None;
+        }
+        let Some(faces) = surface::faces(&self.mesh, number) else {
+            return Some(self.mesh.clone());
+        };
+        let mut places = vec![NOWHERE; self.mesh.positions.len()];
+        Some(select(&self.mesh, &faces, &mut places))
+    }
 }
 
 /// A file, and how it is read: those who agree in both can share a mesh.
@@ -346,6 +380,8 @@ pub(super) struct Decoded {
     pub(super) polygons: Polygons,
     /// As [`Loaded::files`].
     pub(super) files: Vec<PathBuf>,
+    /// As [`Loaded::surfaces`].
+    pub(super) surfaces: Vec<Surface>,
 }
 
 impl Decoded {
@@ -384,6 +420,7 @@ impl Decoded {
             dropped_triangles,
             warnings: warnings(path, self.warnings),
             files: self.files,
+            surfaces: self.surfaces,
         }
     }
 }

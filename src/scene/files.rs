@@ -1,6 +1,7 @@
 //! Shapes that are built in parallel, each of their files read once: those that are made of one file in one way
 //! share what was read, and differ in where they stand.
 
+use std::borrow::Cow;
 use std::collections::HashMap;
 
 use rayon::prelude::*;
@@ -97,7 +98,7 @@ impl Task {
             };
             return self.sites.par_iter().map(build).collect();
         };
-        let place = |site: usize, loaded: Loaded| {
+        let place = |site: usize, loaded: Cow<'_, Loaded>| {
             let Site {
                 properties,
                 setting,
@@ -106,16 +107,16 @@ impl Task {
         };
         let (last, others) = self.sites.split_last().expect("a task has sites");
         let copied = |&site: &usize| {
-            let budget = sites[site].properties.budget();
-            let taken = budget.take(loaded.mesh.room());
+            let properties = sites[site].properties;
+            let taken = (properties.budget()).take(shape::room_of(&loaded, properties));
             match taken {
-                Ok(()) => place(site, loaded.clone()),
-                Err(error) => done(site, Err(error.at(sites[site].properties.location()))),
+                Ok(()) => place(site, Cow::Borrowed(&loaded)),
+                Err(error) => done(site, Err(error.at(properties.location()))),
             }
         };
         let others = others.par_iter().map(copied);
         let mut shapes: Vec<Result<Shape>> = others.collect();
-        shapes.push(place(*last, loaded));
+        shapes.push(place(*last, Cow::Owned(loaded)));
         shapes
     }
 }

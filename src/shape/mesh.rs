@@ -3,6 +3,7 @@
 
 mod triangles;
 
+use std::borrow::Cow;
 use std::sync::OnceLock;
 
 use glam::{DMat4, Vec2, Vec3};
@@ -399,14 +400,43 @@ pub(super) fn file(properties: &Properties<'_>, options: ReadOptions) -> Result<
     Ok(MeshFile { path, options })
 }
 
+/// Which of its file's surfaces a mesh plugin shows, where it is one.
+pub(super) fn surface(properties: &Properties<'_>) -> Result<Option<usize>> {
+    Ok(properties
+        .given::<i64>("surface")?
+        .map(|number| number as usize))
+}
+
 /// The shape that a mesh plugin makes of its file.
 pub(super) fn place_file(
-    loaded: Loaded,
+    loaded: Cow<'_, Loaded>,
     properties: &Properties<'_>,
     setting: &Setting<'_>,
 ) -> Result<Shape> {
-    let mut shape = place_in(setting, loaded.mesh, properties)?;
-    shape.warnings.splice(0..0, loaded.warnings);
-    shape.files = loaded.files;
+    let (mesh, warnings, files) = match surface(properties)? {
+        None => {
+            let Loaded {
+                mesh,
+                warnings,
+                files,
+                ..
+            } = loaded.into_owned();
+            (mesh, warnings, files)
+        }
+        Some(number) => {
+            let missing = || {
+                let message = match loaded.surfaces.len() {
+                    0 => "the file says nothing of materials, or is not read as bare".to_owned(),
+                    count => format!("the file has no surface {number}: it has {count} of them"),
+                };
+                properties.error("surface", message)
+            };
+            let mesh = loaded.of_surface(number).ok_or_else(missing)?;
+            (mesh, loaded.warnings.clone(), loaded.files.clone())
+        }
+    };
+    let mut shape = place_in(setting, mesh, properties)?;
+    shape.warnings.splice(0..0, warnings);
+    shape.files = files;
     Ok(shape)
 }

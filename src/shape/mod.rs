@@ -27,12 +27,14 @@ mod serialized;
 mod stl;
 mod triangle;
 
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 use glam::{DAffine3, DMat3, DMat4, DVec3, Vec2, Vec3};
 
 use crate::description::declared::{
-    Plugin, Plugins, Row, boolean, file, float, medium, motion, nested, number, string, transform,
+    Plugin, Plugins, Row, boolean, file, float, integer, medium, motion, nested, number, string,
+    transform,
 };
 use crate::description::{Kind, Properties};
 use crate::error::{Problem, Result};
@@ -430,6 +432,7 @@ const FILE: &[Row] = &[
     boolean("flip_tex_coords", false, "whether v runs from the top")
         .absent("true for obj, else false"),
     boolean("bare", false, "whether the file is read as one without a scene: with its colours, its concave polygons as they are, and near the origin").own(),
+    integer("surface", 0, "of a bare file, the faces alone that have this one of its surfaces, from 0: materials that differ in colour alone are one").between(0.0, 1e6).absent("all").own(),
 ];
 
 /// Shapes made of shapes, which the scene puts together: several in a space of their own, and those once
@@ -524,7 +527,7 @@ pub fn build_within(setting: &Setting<'_>, properties: &Properties<'_>) -> Resul
             let file = mesh::file(properties, options(properties)?)?;
             let loaded = read(&file.path, &file.options, properties.budget());
             let loaded = loaded.map_err(|e| e.named_at(properties.location()))?;
-            from_file(loaded, properties, setting)
+            from_file(Cow::Owned(loaded), properties, setting)
         }
         None => {
             let message = format!("a {} is put together by the scene", properties.plugin());
@@ -544,15 +547,28 @@ pub fn mesh_file(properties: &Properties<'_>) -> Option<MeshFile> {
 
 /// As [`build_within`], with the [`mesh_file`] read already.
 pub fn build_from(
-    loaded: Loaded,
+    loaded: Cow<'_, Loaded>,
     setting: &Setting<'_>,
     properties: &Properties<'_>,
 ) -> Result<Shape> {
     from_file(loaded, &declared(properties)?, setting)
 }
 
+/// Bytes that the shape will hold of a file that is read already.
+pub fn room_of(loaded: &Loaded, properties: &Properties<'_>) -> u64 {
+    match mesh::surface(properties) {
+        Ok(Some(surface)) => loaded.room_of(surface),
+        // What is wrong is told where the shape is built.
+        _ => loaded.mesh.room(),
+    }
+}
+
 /// The shape that a plugin makes of its file, and of those of later times.
-fn from_file(loaded: Loaded, properties: &Properties<'_>, setting: &Setting<'_>) -> Result<Shape> {
+fn from_file(
+    loaded: Cow<'_, Loaded>,
+    properties: &Properties<'_>,
+    setting: &Setting<'_>,
+) -> Result<Shape> {
     let shape = mesh::place_file(loaded, properties, setting)?;
     let Some(Build::Read(options)) = single(properties) else {
         return Ok(shape);
@@ -573,7 +589,7 @@ fn from_file(loaded: Loaded, properties: &Properties<'_>, setting: &Setting<'_>)
         }
         let loaded = read(&file.path, &file.options, properties.budget());
         let loaded = loaded.map_err(|e| e.named_at(properties.location()))?;
-        shapes.push(mesh::place_file(loaded, properties, setting)?);
+        shapes.push(mesh::place_file(Cow::Owned(loaded), properties, setting)?);
     }
     deforming::joined(shapes, times.clone(), properties)
 }

@@ -3,7 +3,8 @@
 //! each half as large, by how much of it what a ray stands for covers ([`super::pyramid`]); and `anisotropic`, by up to
 //! `max_anisotropy` such looks along what is covered where that is longer than wide ([`super::probes`]). Where nobody knows what a
 //! ray stands for, these two are bilinear. `wrap_mode` is repeat, mirror or clamp; 8- and 16-bit
-//! files are decoded from sRGB unless `raw` says that they hold numbers; alpha is dropped. In bands, as in Mitsuba's
+//! files are decoded from sRGB unless `raw` says that they hold numbers; alpha is dropped. Étendue's own are `image`, the number
+//! of an image that lies in a glTF file, `channel`: one channel in place of the colour, and `wrap_mode_v`. In bands, as in Mitsuba's
 //! spectral variants, colours become the spectra of reflectances whatever they stand for: as light they are clamped to
 //! [0, 1] and have no illuminant, unless a `d65` holds the bitmap.
 
@@ -14,7 +15,7 @@ use glam::{Mat3, Vec2};
 
 use super::probes::{Probes, Shape};
 use super::pyramid::{Mipmap, Pyramid};
-use super::{Palette, Pattern, Picture, TexelKey, to_uv, transformed};
+use super::{Palette, Pattern, Picture, TexelKey, Wanted, to_uv, transformed};
 use crate::budget::Budget;
 use crate::color::{ColorModel, Role, Spectra, Spectral};
 use crate::description::Properties;
@@ -23,6 +24,7 @@ use crate::description::properties::STRICT;
 use crate::error::Result;
 use crate::interaction::Interaction;
 use crate::lanes::{self, Call, Ints, Lanes};
+use crate::mesh;
 
 /// An image whose texels are ready to be evaluated, row by row from the top.
 #[derive(Debug)]
@@ -50,6 +52,14 @@ fn modulo<F: Lanes>(i: F, n: F) -> F {
 }
 
 impl Wrap {
+    fn named(name: &str) -> Self {
+        match name {
+            "mirror" => Self::Mirror,
+            "clamp" => Self::Clamp,
+            _ => Self::Repeat,
+        }
+    }
+
     /// The texel that stands for the whole number `i` of `n`, wherever it lies.
     #[inline(always)]
     pub(super) fn apply<F: Lanes>(self, i: F, n: usize) -> F::Int {
@@ -78,7 +88,8 @@ pub struct Bitmap<C: ColorModel> {
     nearest: bool,
     /// How what is seen of the image is looked up in its levels, if it has any.
     shape: Shape,
-    wrap: Wrap,
+    /// Along u and v.
+    wrap: [Wrap; 2],
     to_uv: Mat3,
 }
 
@@ -95,7 +106,17 @@ impl<C: ColorModel> Bitmap<C> {
     pub(super) const PLUGIN: Plugin = Plugin {
         about: "an image",
         properties: &[&[
-            file("filename", "the image"),
+            file("filename", "the image, or a glTF file with images in it"),
+            integer("image", 0, "which of a glTF file's images, from 0")
+                .between(0.0, 1e6)
+                .absent("the file is the image")
+                .own(),
+            choice(
+                "channel",
+                &["color", "r", "g", "b", "a"],
+                "what of it is looked up; an image without a is opaque",
+            )
+            .own(),
             choice(
                 "filter_type",
                 &["bilinear", "nearest", "trilinear", "anisotropic"],
@@ -113,6 +134,12 @@ impl<C: ColorModel> Bitmap<C> {
                 &["repeat", "mirror", "clamp"],
                 "what lies beyond the edge",
             ),
+            choice(
+                "wrap_mode_v",
+                &["same", "repeat", "mirror", "clamp"],
+                "what lies above and below, if not the same",
+            )
+            .own(),
             boolean(
                 "raw",
                 false,
@@ -136,19 +163,36 @@ impl<C: ColorModel> Bitmap<C> {
             let message = "this filter is Étendue's own";
             return Err(properties.error("filter_type", message).help(STRICT));
         }
-        let wrap = match properties.choice("wrap_mode")? {
-            "mirror" => Wrap::Mirror,
-            "clamp" => Wrap::Clamp,
-            _ => Wrap::Repeat,
+        let along_u = properties.choice("wrap_mode")?;
+        let along_v = match properties.choice("wrap_mode_v")? {
+            "same" => along_u,
+            other => other,
         };
+        let wrap = [along_u, along_v].map(Wrap::named);
         let raw = properties.boolean("raw")?;
         let path = properties.file("filename")?;
         let to_uv = to_uv(properties)?;
         let mipmapped = shape.is_some();
+        let image = properties.given::<i64>("image")?;
+        let holds_images = matches!(mesh::extension(&path).as_str(), "gltf" | "glb");
+        if image.is_some() != holds_images {
+            let message = match holds_images {
+                true => "a glTF file holds several images: give image, from 0",
+                false => "only a glTF file (.gltf, .glb) holds images that have numbers",
+            };
+            return Err(properties.error("image", message));
+        }
+        let channel = properties.choice("channel")?;
         let key = TexelKey {
-            path,
+            wanted: Wanted {
+                path,
+                image: image.map(|index| index as usize),
+                channel: (channel != "color")
+                    .then(|| channel.chars().next())
+                    .flatten(),
+                raw,
+            },
             role: palette.role,
-            raw,
             mipmapped,
         };
         palette.mipmaps.fetch_or(mipmapped, Ordering::Relaxed);
@@ -205,14 +249,12 @@ impl<C: ColorModel> Bitmap<C> {
         let (x, y) = (px.floor(), py.floor());
         let Texels { size, texels, .. } = &*self.texels;
         let [width, height] = *size;
-        let (left, right) = (
-            self.wrap.apply(x, width),
-            self.wrap.apply(x + F::one(), width),
-        );
+        let [along_u, along_v] = self.wrap;
+        let (left, right) = (along_u.apply(x, width), along_u.apply(x + F::one(), width));
         let stride = Ints::splat(width as u32);
         let (upper, lower) = (
-            self.wrap.apply(y, height) * stride,
-            self.wrap.apply(y + F::one(), height) * stride,
+            along_v.apply(y, height) * stride,
+            along_v.apply(y + F::one(), height) * stride,
         );
         Cell {
             corners: [
@@ -266,8 +308,9 @@ impl<C: ColorModel> Bitmap<C> {
         if self.nearest {
             let place = self.place(uv);
             let Texels { size, texels, .. } = &*self.texels;
-            let x = self.wrap.apply(place.x.floor(), size[0]);
-            let y = self.wrap.apply(place.y.floor(), size[1]);
+            let [along_u, along_v] = self.wrap;
+            let x = along_u.apply(place.x.floor(), size[0]);
+            let y = along_v.apply(place.y.floor(), size[1]);
             let index = y * Ints::splat(size[0] as u32) + x;
             return C::evaluate_texels(texels, index, wavelengths);
         }
@@ -324,8 +367,8 @@ struct Loaded<C: ColorModel> {
 }
 
 fn load<C: ColorModel>(key: &TexelKey, palette: &Palette<C>, budget: &Budget) -> Result<Loaded<C>> {
-    let raw = key.raw;
-    let picture = Picture::read(&key.path, raw, budget)?;
+    let raw = key.wanted.raw;
+    let picture = Picture::read(&key.wanted, budget)?;
     let size = picture.size;
     let role = match palette.role {
         Role::Reflectance if raw => Role::Quantity,

@@ -11,6 +11,7 @@ mod irregular;
 mod mesh_attribute;
 mod picture;
 mod probes;
+mod product;
 mod pyramid;
 mod rawconstant;
 mod regular;
@@ -21,7 +22,6 @@ pub mod volume;
 mod zoneplate;
 
 use std::collections::HashMap;
-use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 
@@ -37,7 +37,7 @@ use crate::lanes::{self, Call, Lanes, MAX_LANES, Mask as _};
 
 use bitmap::Texels;
 
-pub use picture::Picture;
+pub use picture::{Picture, Wanted};
 
 /// What every texture does.
 pub trait Pattern<C: ColorModel>: std::fmt::Debug + Send + Sync {
@@ -72,6 +72,7 @@ family! {
         "glass" => Glass(glass::Glass<C>),
         "irregular" => Irregular(irregular::Irregular<C>),
         "mesh_attribute" => MeshAttribute(mesh_attribute::MeshAttribute<C>),
+        "product" => Product(product::Product<C>),
         "rawconstant" => RawConstant(rawconstant::RawConstant<C>),
         "regular" => Regular(regular::Regular<C>),
         "sellmeier" => Sellmeier(sellmeier::Sellmeier<C>),
@@ -122,6 +123,7 @@ impl<C: ColorModel, F: Lanes> Call<F> for LookUp<'_, C, F> {
             Texture::Bitmap(bitmap) => bitmap.eval_lanes(at.uv, at.footprint, wavelengths),
             Texture::Checkerboard(board) => board.eval_lanes(at, wavelengths),
             Texture::D65(light) => light.eval_lanes(at, wavelengths),
+            Texture::Product(product) => product.eval_lanes(at, wavelengths),
             Texture::Volume(volume) => volume.eval_lanes(at, wavelengths),
             other => eval_each(other, at, wavelengths),
         }
@@ -171,9 +173,8 @@ type TexelCache<C> = Arc<Mutex<HashMap<TexelKey, Arc<Texels<C>>>>>;
 /// What two textures must agree in to share their texels.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 struct TexelKey {
-    path: PathBuf,
+    wanted: Wanted,
     role: Role,
-    raw: bool,
     mipmapped: bool,
 }
 

@@ -1,13 +1,55 @@
 //! An image file as linear BT.709 texels, for the plugins that look into one: 8- and 16-bit files are decoded
-//! from sRGB unless they hold plain numbers, values that are not finite count as 0, alpha is dropped.
+//! from sRGB unless they hold plain numbers, values that are not finite count as 0, alpha is dropped unless it is what is
+//! wanted. Images in glTF files are found there by their numbers.
 
-use std::path::Path;
+use std::path::PathBuf;
 
 use super::pyramid::{Levels, Pyramid};
 use crate::budget::{Account, Budget};
 use crate::color::{ColorModel, Pixels, Role, srgb};
 use crate::error::{Error, Location, Result};
 use crate::image::{self, Encoding, Image};
+use crate::mesh::gltf_image;
+
+/// What of a file is wanted.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct Wanted {
+    /// The image, or a glTF file with images in it.
+    pub path: PathBuf,
+    /// Which of a glTF file's images.
+    pub image: Option<usize>,
+    /// One of the channels `r`, `g`, `b` and `a`, the last of which is 1 where an image has none; `None`: the colour.
+    pub channel: Option<char>,
+    /// Whether it holds plain numbers.
+    pub raw: bool,
+}
+
+impl Wanted {
+    /// The colours of an image file.
+    pub fn colors(path: PathBuf) -> Self {
+        Self {
+            path,
+            image: None,
+            channel: None,
+            raw: false,
+        }
+    }
+
+    fn read(&self, account: &Account) -> Result<image::Picture> {
+        match self.image {
+            None => image::read(&self.path, account),
+            Some(index) => {
+                let bytes = gltf_image(&self.path, index, u64::MAX, account)?;
+                let picture = image::read_bytes(&self.path, &bytes, account);
+                picture.map_err(|e| {
+                    let message = &e.problems()[0].message;
+                    Error::input(format!("image {index} in it: {message}"))
+                        .at(&Location::of_file(&self.path))
+                })
+            }
+        }
+    }
+}
 
 /// The colours of an image file.
 #[derive(Debug)]
@@ -22,18 +64,31 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// Reads the file; `raw` says that it holds plain numbers.
+    /// Reads what is wanted.
     ///
     /// # Errors
     /// Where the file cannot be read, holds no colours or is larger than the budget allows.
-    pub fn read(path: &Path, raw: bool, budget: &Budget) -> Result<Self> {
+    pub fn read(wanted: &Wanted, budget: &Budget) -> Result<Self> {
         let account = budget.open();
-        let picture = image::read(path, &account)?;
+        let picture = wanted.read(&account)?;
         let image = picture.image.into_rgb();
-        let Some(rgb) = image.rgb() else {
-            let message = format!("no colour channels among {:?}", image.channels());
-            return Err(Error::input(message).at(&Location::of_file(path)));
+        let channels = match wanted.channel {
+            None => image.rgb(),
+            Some('a') => match image.alpha() {
+                Some(alpha) => Some([alpha; 3]),
+                None => return Ok(Self::opaque(account)),
+            },
+            Some(channel) => image.rgb().map(|[r, g, b]| match channel {
+                'r' => [r; 3],
+                'g' => [g; 3],
+                _ => [b; 3],
+            }),
         };
+        let Some(rgb) = channels else {
+            let message = format!("no colour channels among {:?}", image.channels());
+            return Err(Error::input(message).at(&Location::of_file(&wanted.path)));
+        };
+        let raw = wanted.raw || wanted.channel == Some('a');
         let size = [image.width() as usize, image.height() as usize];
         let take = |bytes| account.take_rows(size[0] * size[1], bytes);
         let decode: fn(f32) -> f32 = match picture.encoding {
@@ -62,6 +117,16 @@ impl Picture {
             },
             account,
         })
+    }
+
+    /// The opacity of an image that has none.
+    fn opaque(account: Account) -> Self {
+        Self {
+            size: [1, 1],
+            pixels: Pixels::Linear(vec![[1.0; 3]]),
+            grey: true,
+            account,
+        }
     }
 
     /// Smaller images of what the colours stand for, see [`Levels`].

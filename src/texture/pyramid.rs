@@ -101,7 +101,8 @@ pub(super) struct Mipmap<'a, C: ColorModel> {
     pub(super) size: [usize; 2],
     pub(super) texels: &'a C::Texels,
     pub(super) pyramid: &'a Pyramid<C>,
-    pub(super) wrap: Wrap,
+    /// Along u and v.
+    pub(super) wrap: [Wrap; 2],
 }
 
 /// Two levels, and how much the upper one counts.
@@ -202,7 +203,7 @@ fn bilinear<C: ColorModel, F: Lanes>(
     texels: &C::Texels,
     size: Vec2<F>,
     first: F::Int,
-    wrap: Wrap,
+    [along_u, along_v]: [Wrap; 2],
     uv: Vec2<F>,
     wavelengths: &[C::Wavelengths],
 ) -> C::Columns<F> {
@@ -210,13 +211,13 @@ fn bilinear<C: ColorModel, F: Lanes>(
     let (px, py) = (uv.x * size.x - half, uv.y * size.y - half);
     let (x, y) = (px.floor(), py.floor());
     let (left, right) = (
-        wrap.apply_each(x, size.x),
-        wrap.apply_each(x + F::one(), size.x),
+        along_u.apply_each(x, size.x),
+        along_u.apply_each(x + F::one(), size.x),
     );
     let stride = size.x.to_int();
     let (above, below) = (
-        first + wrap.apply_each(y, size.y) * stride,
-        first + wrap.apply_each(y + F::one(), size.y) * stride,
+        first + along_v.apply_each(y, size.y) * stride,
+        first + along_v.apply_each(y + F::one(), size.y) * stride,
     );
     let (fx, fy) = (px - x, py - y);
     let (gx, gy) = (F::one() - fx, F::one() - fy);

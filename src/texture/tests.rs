@@ -222,6 +222,7 @@ fn every_texture<C: ColorModel>(color: &C) -> Vec<(&'static str, Texture<C>)> {
         "blackbody" => "<float name='temperature' value='4000'/>".to_owned(),
         "irregular" => "<string name='wavelengths' value='400, 500, 600'/><string name='values' value='0.1, 0.3, 0.2'/>".to_owned(),
         "mesh_attribute" => "<string name='name' value='vertex_color'/>".to_owned(),
+        "product" => "<texture name='color0' type='zoneplate'><float name='rings' value='2'/></texture><float name='color1' value='0.5'/>".to_owned(),
         "rawconstant" => "<float name='value' value='0.3'/>".to_owned(),
         "regular" => "<float name='wavelength_min' value='400'/><float name='wavelength_max' value='700'/><string name='values' value='0.1, 0.3'/>".to_owned(),
         "sellmeier" => "<string name='b' value='1.04, 0.23'/><string name='c' value='0.006, 0.02'/>".to_owned(),

@@ -366,3 +366,162 @@ fn lights_of_a_gltf_file_give_what_candela_and_lux_say() {
         assert!(error.to_string().contains(message), "{error}");
     }
 }
+
+/// An image of four quarters: red and green above, blue and white below; what is red is half transparent.
+fn quarters() -> Vec<u8> {
+    let at = |x: u32, y: u32| match (x < 8, y < 8) {
+        (true, true) => image::Rgba([255, 0, 0, 100]),
+        (false, true) => image::Rgba([0, 255, 0, 255]),
+        (true, false) => image::Rgba([0, 0, 255, 255]),
+        (false, false) => image::Rgba([255; 4]),
+    };
+    let mut png = std::io::Cursor::new(Vec::new());
+    let picture = image::RgbaImage::from_fn(16, 16, at);
+    picture.write_to(&mut png, image::ImageFormat::Png).unwrap();
+    png.into_inner()
+}
+
+/// A GLB file of a square in the plane of x and y, with this image and material.
+fn square_glb(png: &[u8], material: &str) -> Vec<u8> {
+    let corners = [
+        [-1.0, -1.0, 0.0],
+        [1.0, -1.0, 0.0],
+        [1.0, 1.0, 0.0],
+        [-1.0, 1.0, 0.0f32],
+    ];
+    let uvs = [[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0f32]];
+    let mut binary: Vec<u8> = Vec::new();
+    let numbers = corners.concat().into_iter().chain(uvs.concat());
+    binary.extend(numbers.flat_map(f32::to_le_bytes));
+    binary.extend([0, 1, 2, 0, 2, 3, 0, 0]);
+    binary.extend(png);
+    let length = png.len();
+    let json = format!(
+        r#"{{"asset":{{"version":"2.0"}},"scenes":[{{"nodes":[0]}}],"nodes":[{{"mesh":0}}],
+        "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0,"TEXCOORD_0":1}},"indices":2,"material":0}}]}}],
+        "materials":[{material}],"textures":[{{"source":0}}],"images":[{{"bufferView":3,"mimeType":"image/png"}}],
+        "accessors":[{{"bufferView":0,"componentType":5126,"count":4,"type":"VEC3","min":[-1,-1,0],"max":[1,1,0]}},
+            {{"bufferView":1,"componentType":5126,"count":4,"type":"VEC2"}},
+            {{"bufferView":2,"componentType":5121,"count":6,"type":"SCALAR"}}],
+        "bufferViews":[{{"buffer":0,"byteLength":48}},{{"buffer":0,"byteOffset":48,"byteLength":32}},
+            {{"buffer":0,"byteOffset":80,"byteLength":6}},{{"buffer":0,"byteOffset":88,"byteLength":{length}}}],
+        "buffers":[{{"byteLength":{}}}]}}"#,
+        binary.len()
+    );
+    let chunk = |kind: &[u8; 4], data: &[u8], filler: u8| {
+        let mut data = data.to_vec();
+        data.resize(data.len().next_multiple_of(4), filler);
+        [&(data.len() as u32).to_le_bytes()[..], kind, &data].concat()
+    };
+    let chunks = [
+        chunk(b"JSON", json.as_bytes(), b' '),
+        chunk(b"BIN\0", &binary, 0),
+    ]
+    .concat();
+    let length = (12 + chunks.len() as u32).to_le_bytes();
+    [b"glTF\x02\0\0\0", &length[..], &chunks].concat()
+}
+
+/// The colours in the middle of the quarters of a bare file's picture from the front, row by row from the top.
+fn seen_quarters(path: &Path) -> ([[f32; 4]; 4], Vec<String>) {
+    let staging = Staging {
+        azimuth: Some(0.0),
+        elevation: Some(0.0),
+        lighting: Lighting::Sky,
+        background: etendue::render::Background::Transparent,
+        aspect: 1.0,
+        ..Staging::default()
+    };
+    let options = description::Options::default();
+    let mut bare = describe_mesh(path, &staging, &options, &Budget::default()).unwrap();
+    let overrides = Overrides {
+        size: Some((32, 32)),
+        spp: Some(64),
+        ..Overrides::default()
+    };
+    overrides.apply(&mut bare.description);
+    let mut session = Session::default();
+    session.give(bare.mesh);
+    let rendered = (session.render(&bare.description, &Options::default(), &Silent)).unwrap();
+    let told = rendered.warnings.iter().map(|w| w.message.clone());
+    let of = |x, y| {
+        let pixel = rendered.image.pixel(x, y);
+        [0, 1, 2, 3].map(|c| pixel[c])
+    };
+    (
+        [of(10, 10), of(21, 10), of(10, 21), of(21, 21)],
+        told.collect(),
+    )
+}
+
+#[test]
+fn images_of_gltf_obj_and_ply_files_stand_upright_and_are_as_bright_as_they_say() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let png = quarters();
+    fs::write(path("the image.png"), &png).unwrap();
+    let matte = r#""metallicFactor":0,"baseColorTexture":{"index":0}"#;
+    let made = |more: &str, after: &str| {
+        square_glb(
+            &png,
+            &format!(r#"{{"pbrMetallicRoughness":{{{matte}{more}}}{after}}}"#),
+        )
+    };
+    fs::write(path("plain.glb"), made("", "")).unwrap();
+    let half = r#","baseColorFactor":[0.5,0.5,0.5,1]"#;
+    fs::write(path("factor.glb"), made(half, "")).unwrap();
+    fs::write(path("cut.glb"), made("", r#","alphaMode":"MASK""#)).unwrap();
+    fs::write(path("blend.glb"), made("", r#","alphaMode":"BLEND""#)).unwrap();
+    let obj = "mtllib m.mtl\nv -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n\
+        usemtl a\nf 1/1 2/2 3/3 4/4\n";
+    fs::write(path("plain.obj"), obj).unwrap();
+    fs::write(
+        path("m.mtl"),
+        "newmtl a\nKd 1 1 1\nmap_Kd -s 1 1 1 the image.png\n",
+    )
+    .unwrap();
+    let ply = "ply\nformat ascii 1.0\ncomment TextureFile the image.png\nelement vertex 4\n\
+        property float x\nproperty float y\nproperty float z\nproperty float s\nproperty float t\n\
+        element face 1\nproperty list uchar int vertex_indices\nend_header\n\
+        -1 -1 0 0 0\n1 -1 0 1 0\n1 1 0 1 1\n-1 1 0 0 1\n4 0 1 2 3\n";
+    fs::write(path("plain.ply"), ply).unwrap();
+    // Under a sky of this radiance what is white and convex has it too.
+    let sky = [0.9, 0.95, 1.0];
+    for (name, factor, red) in [
+        ("plain.glb", 1.0, 1.0),
+        ("factor.glb", 0.5, 1.0),
+        ("plain.obj", 1.0, 1.0),
+        ("plain.ply", 1.0, 1.0),
+        ("cut.glb", 1.0, 0.0),
+        ("blend.glb", 1.0, 100.0 / 255.0),
+    ] {
+        let (found, told) = seen_quarters(&path(name));
+        assert!(told.is_empty(), "{name}: {told:?}");
+        let colors = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0; 3]];
+        for (quarter, (found, color)) in found.iter().zip(colors).enumerate() {
+            let alpha = if quarter == 0 { red } else { 1.0 };
+            let part = |c: usize| alpha * factor * sky[c] * color[c];
+            let expected = [part(0), part(1), part(2), alpha];
+            // What is let through by chance is not seen evenly.
+            let tolerance = if 0.0 < alpha && alpha < 1.0 {
+                0.2
+            } else {
+                0.02
+            };
+            for (found, expected) in found.iter().zip(expected) {
+                assert!(
+                    (found - expected).abs() < tolerance,
+                    "{name} {quarter}: {found} {expected}"
+                );
+            }
+        }
+    }
+    // An image that is lost is told of.
+    fs::remove_file(path("the image.png")).unwrap();
+    let (found, told) = seen_quarters(&path("plain.obj"));
+    assert!(
+        told.len() == 1 && told[0].contains("the image.png is not shown"),
+        "{told:?}"
+    );
+    assert!(found[0][1] > 0.5, "white without its image: {found:?}");
+}

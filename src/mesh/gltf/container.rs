@@ -165,13 +165,14 @@ impl<'a> Buffers<'a> {
     }
 }
 
-fn is_data(uri: &str) -> bool {
+/// Whether a URI holds what it names.
+pub(super) fn is_data(uri: &str) -> bool {
     let scheme = uri.get(..5);
     scheme.is_some_and(|scheme| scheme.eq_ignore_ascii_case("data:"))
 }
 
 /// The bytes that a `data:` URI holds (RFC 2397): in base64, or as they are with escapes.
-fn decode(uri: &str) -> OrWhy<Vec<u8>> {
+pub(super) fn decode(uri: &str) -> OrWhy<Vec<u8>> {
     /// With or without `=` at the end.
     const BASE64: GeneralPurpose = GeneralPurpose::new(
         &alphabet::STANDARD,
@@ -196,7 +197,7 @@ fn decode(uri: &str) -> OrWhy<Vec<u8>> {
 }
 
 /// The file beside `path` that a URI names.
-fn beside(uri: &str, path: &Path) -> OrWhy<PathBuf> {
+pub(super) fn beside(uri: &str, path: &Path) -> OrWhy<PathBuf> {
     if uri.contains("://") {
         return Err(format!(
             "{uri:?} is not a file beside this one, and nothing is fetched"

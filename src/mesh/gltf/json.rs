@@ -23,6 +23,11 @@ pub(super) struct Root<'a> {
     pub(super) nodes: Vec<Node>,
     pub(super) meshes: Vec<Mesh>,
     pub(super) materials: Vec<Material>,
+    pub(super) textures: Vec<Texture>,
+    #[serde(rename = "samplers")]
+    pub(super) lookups: Vec<Lookup>,
+    #[serde(borrow)]
+    pub(super) images: Vec<Image<'a>>,
     pub(super) cameras: Vec<Camera>,
     pub(super) skins: Vec<Skin>,
     pub(super) animations: Vec<Animation>,
@@ -136,9 +141,9 @@ pub(super) struct PrimitiveExtensions {
 #[serde(default, rename_all = "camelCase")]
 pub(super) struct Material {
     pub(super) pbr_metallic_roughness: Pbr,
-    pub(super) normal_texture: Option<IgnoredAny>,
+    pub(super) normal_texture: Option<TextureInfo>,
     pub(super) occlusion_texture: Option<IgnoredAny>,
-    pub(super) emissive_texture: Option<IgnoredAny>,
+    pub(super) emissive_texture: Option<TextureInfo>,
     pub(super) emissive_factor: [f32; 3],
     pub(super) alpha_mode: Option<String>,
     pub(super) alpha_cutoff: Option<f32>,
@@ -153,25 +158,29 @@ pub(super) struct Pbr {
     pub(super) base_color_texture: Option<TextureInfo>,
     pub(super) metallic_factor: Option<f32>,
     pub(super) roughness_factor: Option<f32>,
-    pub(super) metallic_roughness_texture: Option<IgnoredAny>,
+    pub(super) metallic_roughness_texture: Option<TextureInfo>,
 }
 
-#[derive(Deserialize, Default)]
+#[derive(Clone, Deserialize, Default)]
 #[serde(default, rename_all = "camelCase")]
 pub(super) struct TextureInfo {
+    /// Which of the file's textures.
+    pub(super) index: usize,
+    /// What x and y of normals are multiplied by.
+    pub(super) scale: Option<f32>,
     /// Which of the primitive's texture coordinates.
     pub(super) tex_coord: u32,
     pub(super) extensions: TextureExtensions,
 }
 
-#[derive(Deserialize, Default)]
+#[derive(Clone, Deserialize, Default)]
 #[serde(default)]
 pub(super) struct TextureExtensions {
     #[serde(rename = "KHR_texture_transform")]
     pub(super) transform: Option<TextureTransform>,
 }
 
-#[derive(Deserialize, Default)]
+#[derive(Clone, Deserialize, Default)]
 #[serde(default, rename_all = "camelCase")]
 pub(super) struct TextureTransform {
     pub(super) offset: [f32; 2],
@@ -180,6 +189,33 @@ pub(super) struct TextureTransform {
     pub(super) scale: Option<[f32; 2]>,
     /// In place of [`TextureInfo::tex_coord`].
     pub(super) tex_coord: Option<u32>,
+}
+
+/// An image, and how it is looked up.
+#[derive(Deserialize, Default)]
+#[serde(default)]
+pub(super) struct Texture {
+    pub(super) sampler: Option<usize>,
+    /// An image; `None`: an extension knows it.
+    pub(super) source: Option<usize>,
+    pub(super) extensions: BTreeMap<String, IgnoredAny>,
+}
+
+/// How texels are looked up, in numbers of OpenGL.
+#[derive(Deserialize, Default)]
+#[serde(default, rename_all = "camelCase")]
+pub(super) struct Lookup {
+    pub(super) mag_filter: Option<u32>,
+    pub(super) wrap_s: Option<u32>,
+    pub(super) wrap_t: Option<u32>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(default, rename_all = "camelCase")]
+pub(super) struct Image<'a> {
+    #[serde(borrow)]
+    pub(super) uri: Option<Cow<'a, str>>,
+    pub(super) buffer_view: Option<usize>,
 }
 
 #[derive(Deserialize, Default)]

@@ -1,7 +1,7 @@
 //! glTF 2.0, as JSON or GLB: the meshes of the default scene in world space with their colours, and its setting: the first camera and the lights.
 //! Morph targets stand at their default weights, skins at their nodes' places, or both as the first animation has them at
-//! a time that is asked for. Of materials their factors are read, or their base colours alone. Both sides of a triangle are
-//! there, whatever `doubleSided` says. Pictures are left out, lights where they are not asked for, and animations where no time is, with a warning for each kind. Texture coordinates are those of the base colour, with their origin at the
+//! a time that is asked for. Of materials their factors and textures are read, or their base colours alone. Both sides of a triangle are
+//! there, whatever `doubleSided` says. Lights are left out where they are not asked for, and animations where no time is, with a warning for each kind. Texture coordinates are those of the base colour or the first texture, with their origin at the
 //! top left, as Mitsuba's bitmaps have it, and stay as they are. A primitive without normals is flat, says the
 //! specification: its mesh has none. Under a mirroring transform the winding turns, so that the outside stays outside.
 
@@ -10,6 +10,7 @@ mod json;
 mod accessor;
 mod animation;
 mod container;
+mod image;
 mod lights;
 mod material;
 mod places;
@@ -22,15 +23,18 @@ mod tests;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use glam::{DMat4, DVec3};
+use glam::{DMat4, DVec3, Vec2};
 
 use super::read::{Decoded, Input, Loaded, ReadOptions, warnings, with_input};
+use super::surface::{Surface, Surfaces};
 use super::{Attribute, Mesh, Per};
 use crate::budget::{Account, Budget};
 use crate::error::{Error, Location, Problem, Result};
 use accessor::Accessors;
 use container::{Buffers, Container};
-use json::{Material, Primitive, Root, at};
+use image::Textures;
+pub use image::gltf_image;
+use json::{Primitive, Root, at};
 use material::Coordinates;
 use places::Places;
 use primitive::{Mode, Recipe, Size};
@@ -57,35 +61,8 @@ pub struct GltfPart {
     pub mesh: Mesh,
     /// Linear red, green, blue, and alpha, in [0, 1]: the material's base colour factor.
     pub base_color: [f32; 4],
-    /// The rest of the material.
-    pub surface: GltfSurface,
     /// The node's name, or its mesh's; empty where neither has one.
     pub name: String,
-}
-
-/// A material beside its base colour, by its factors.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct GltfSurface {
-    /// From a mirror to matte, in [0, 1].
-    pub roughness: f32,
-    /// From a dielectric to a metal, in [0, 1].
-    pub metallic: f32,
-    /// Linear red, green and blue, in cd/m², as far as it is opaque. Not negative.
-    pub emission: [f32; 3],
-    /// In [0, 1].
-    pub opacity: f32,
-}
-
-impl Default for GltfSurface {
-    /// That of a primitive without a material.
-    fn default() -> Self {
-        Self {
-            roughness: 1.0,
-            metallic: 1.0,
-            emission: [0.0; 3],
-            opacity: 1.0,
-        }
-    }
 }
 
 /// A camera: it looks along −Z of its own frame, with +Y up and +X to the right.
@@ -244,17 +221,31 @@ pub fn gltf_is_animated(path: &Path, budget: &Budget) -> Result<bool> {
 /// All parts as one mesh, with their colours, and with the rest of their materials where the file is all there is.
 pub(super) fn read(input: Input<'_>, options: &ReadOptions) -> Result<Decoded> {
     let look = if options.bare {
-        Look::Factors
+        Look::Whole
     } else {
         Look::Color
     };
-    let walk = walk(input, options, look)?;
-    let mut mesh = Mesh::default();
-    for part in walk.parts {
+    let mut walk = walk(input, options, look)?;
+    if look == Look::Whole {
+        walk.fill_uvs();
+    }
+    let (mut mesh, mut runs) = (Mesh::default(), Vec::new());
+    for (part, surface) in walk.parts.into_iter().zip(walk.of_parts) {
+        runs.push((part.mesh.triangles.len(), surface));
         mesh.append(part.mesh);
     }
+    if walk.surfaces.too_many {
+        walk.notes.add(
+            "materials beyond the first 1024 of different look are shown as the last of those",
+        );
+    }
+    let surfaces = match look == Look::Whole && walk.made {
+        true => walk.surfaces.of_faces(&mut mesh, &runs),
+        false => Vec::new(),
+    };
     Ok(Decoded {
         mesh,
+        surfaces,
         warnings: walk.notes.told(),
         files: walk.files,
         ..Decoded::default()
@@ -267,8 +258,8 @@ enum Look {
     /// Their base colours.
     #[default]
     Color,
-    /// All of their factors.
-    Factors,
+    /// All of their factors and textures.
+    Whole,
 }
 
 /// What is left out of a file: told once for each kind.
@@ -298,13 +289,14 @@ impl Notes {
             told.push(format!("vertex data left out: {names}"));
         }
         if let Some(names) = listed(&self.unseen) {
-            let what = match self.look {
-                Look::Color => "base colour factor",
-                Look::Factors => "factors",
-            };
-            told.push(format!(
-                "materials are shown by their {what} alone, without {names}"
-            ));
+            told.push(match self.look {
+                Look::Color => {
+                    format!(
+                        "materials are shown by their base colour factor alone, without {names}"
+                    )
+                }
+                Look::Whole => format!("materials are shown without {names}"),
+            });
         }
         told
     }
@@ -325,6 +317,11 @@ fn listed(names: &BTreeSet<String>) -> Option<String> {
 #[derive(Default)]
 struct Walk {
     parts: Vec<GltfPart>,
+    surfaces: Surfaces,
+    /// The surface of each part.
+    of_parts: Vec<u32>,
+    /// The file.
+    path: PathBuf,
     camera: Option<GltfCamera>,
     notes: Notes,
     /// The files of buffers.
@@ -344,7 +341,10 @@ fn walk(input: Input<'_>, options: &ReadOptions, look: Look) -> Result<Walk> {
         let container = Container::open(&bytes)?;
         take_tree(container.json, account)?;
         let mut root = Root::parse(container.json)?;
-        let mut walk = Walk::default();
+        let mut walk = Walk {
+            path: path.to_owned(),
+            ..Walk::default()
+        };
         walk.notes.look = look;
         let buffers = Buffers::load(&root, container.binary, path, account);
         if let Some(time) = options.time {
@@ -375,9 +375,6 @@ fn walk(input: Input<'_>, options: &ReadOptions, look: Look) -> Result<Walk> {
             walk.node(placed, &stage, &accessors)?;
         }
         walk.color();
-        if look == Look::Factors && walk.made {
-            walk.parts.iter_mut().for_each(GltfPart::describe_surface);
-        }
         walk.files = buffers.files;
         if options.flip_tex_coords.unwrap_or(false) {
             for part in &mut walk.parts {
@@ -440,7 +437,7 @@ impl Walk {
             accessors,
             primitive: own.primitive,
             weights: own.weights,
-            coordinates: Coordinates::of(material),
+            coordinates: Coordinates::of(material, self.notes.look),
             base_color,
         };
         recipe.check_compression()?;
@@ -451,12 +448,34 @@ impl Walk {
         if matches!(mode, Mode::List) && corners % 3 != 0 {
             (self.notes).add("corners after a primitive's last whole triangle are left out");
         }
+        // That of a primitive without a material.
+        let mut surface = Surface {
+            metallic: 1.0,
+            ..Surface::MATTE
+        };
         if let Some(material) = material {
             material.note_unseen(self.notes.look, &mut self.notes.unseen);
             self.made = true;
             self.painted |= material.has_color();
+            if self.notes.look == Look::Whole {
+                let textures = Textures {
+                    root,
+                    path: &self.path,
+                    set: recipe.set(),
+                };
+                surface = material.surface(&textures, &mut self.notes.unseen)?;
+                if material.has_alpha() && recipe.has_vertex_alpha() {
+                    let what = "the alpha of vertex colours";
+                    self.notes.unseen.insert(what.to_owned());
+                }
+            }
         }
-        let unread = recipe.unread().map(str::to_owned);
+        self.of_parts.push(self.surfaces.number(surface));
+        // Textures that ask for other coordinates are told.
+        let is_needless =
+            |name: &&str| self.notes.look == Look::Whole && name.starts_with("TEXCOORD_");
+        let unread = recipe.unread().filter(|name| !is_needless(name));
+        let unread: Vec<String> = unread.map(str::to_owned).collect();
         self.notes.unread.extend(unread);
         let size = vertices.saturating_add(corners);
         self.size = (self.size).saturating_add(size.saturating_mul(own.places.len()));
@@ -488,9 +507,17 @@ impl Walk {
         Ok(Some(GltfPart {
             mesh,
             base_color,
-            surface: material.map_or_else(GltfSurface::default, Material::surface),
             name: String::new(),
         }))
+    }
+
+    /// Gives all parts texture coordinates if any has them, so that they can be put together.
+    fn fill_uvs(&mut self) {
+        if self.parts.iter().any(|part| !part.mesh.uvs.is_empty()) {
+            for GltfPart { mesh, .. } in &mut self.parts {
+                mesh.uvs.resize(mesh.positions.len(), Vec2::ZERO);
+            }
+        }
     }
 
     /// Gives the parts their colours, all in one way so that they can be put together: those of vertices where any
@@ -498,7 +525,7 @@ impl Walk {
     fn color(&mut self) {
         let by_vertex = self.parts.iter().any(|p| !p.mesh.attributes.is_empty());
         let colored = self.parts.iter().any(|p| p.base_color != [1.0; 4])
-            || self.notes.look == Look::Factors && self.painted;
+            || self.notes.look == Look::Whole && self.painted;
         if !by_vertex && !colored {
             return;
         }
@@ -520,32 +547,6 @@ impl Walk {
                 values: base_color[..3].repeat(count),
             });
         }
-    }
-}
-
-impl GltfPart {
-    /// Makes attributes of its material, the same ones of every part.
-    fn describe_surface(&mut self) {
-        let GltfSurface {
-            roughness,
-            metallic,
-            emission,
-            opacity,
-        } = self.surface;
-        let count = self.mesh.triangles.len();
-        let attributes = [
-            ("face_roughness", &[roughness][..]),
-            ("face_metallic", &[metallic]),
-            ("face_emission", &emission),
-            ("face_opacity", &[opacity]),
-        ];
-        let attributes = attributes.map(|(name, row)| Attribute {
-            name: name.to_owned(),
-            channels: row.len(),
-            per: Per::Face,
-            values: row.repeat(count),
-        });
-        self.mesh.attributes.extend(attributes);
     }
 }
 

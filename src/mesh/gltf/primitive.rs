@@ -6,7 +6,7 @@ use glam::Vec3;
 
 use super::OrWhy;
 use super::accessor::Accessors;
-use super::json::{Primitive, draco};
+use super::json::{ElementKind, Primitive, draco};
 use super::material::Coordinates;
 use crate::mesh::{Attribute, Mesh, Per};
 
@@ -136,6 +136,20 @@ impl Recipe<'_> {
             }
         }
         Ok(Some(rows))
+    }
+
+    /// Whether colours of vertices have a fourth number.
+    pub(super) fn has_vertex_alpha(&self) -> bool {
+        let colors = self.primitive.attributes.get("COLOR_0");
+        let accessor = colors.and_then(|&index| self.accessors.root.accessors.get(index));
+        accessor.is_some_and(|accessor| accessor.kind == ElementKind::Vec4)
+    }
+
+    /// Which texture coordinates the mesh has, if it has any.
+    pub(super) fn set(&self) -> Option<u32> {
+        let name = format!("TEXCOORD_{}", self.coordinates.set);
+        let is_there = self.primitive.attributes.contains_key(&name);
+        is_there.then_some(self.coordinates.set)
     }
 
     /// The corners: of each a vertex that there is.

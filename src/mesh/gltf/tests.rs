@@ -9,6 +9,7 @@ use super::*;
 use crate::budget::Budget;
 use crate::mesh::read::testing::decode;
 use crate::mesh::read::{self, Loaded};
+use crate::mesh::surface::{Map, Maps};
 
 /// A document to which accessors are added, all of them in one buffer.
 struct Document {
@@ -588,63 +589,113 @@ fn each_kind_of_thing_that_is_left_out_is_told_once() {
 }
 
 #[test]
-fn the_factors_of_materials_are_attributes_where_the_file_is_all_there_is() {
+fn what_materials_say_is_a_surface_where_the_file_is_all_there_is() {
     let mut document = Document::rectangle();
+    let uvs = json!({"componentType": 5126, "count": 4, "type": "VEC2"});
+    let uvs = document.accessor(&[0; 32], uvs);
     let mut primitives = Vec::new();
-    for material in 0..5 {
+    for material in 0..6 {
         let mut primitive = document.primitive().clone();
         primitive["material"] = material.into();
         primitives.push(primitive);
     }
     primitives.push(document.primitive().clone());
+    primitives[2]["attributes"]["TEXCOORD_0"] = uvs.into();
     document.json["meshes"][0]["primitives"] = primitives.into();
+    document.json["images"] =
+        json!([{"uri": "there/a%20b.png"}, {"uri": "data:image/png;base64,AP8gQQ=="}]);
+    document.json["samplers"] = json!([{"wrapS": 33071, "magFilter": 9728}]);
+    document.json["textures"] = json!([{"source": 0}, {"source": 1, "sampler": 0},
+        {"extensions": {"EXT_texture_webp": {"source": 0}}}]);
     document.json["materials"] = json!([
         {"pbrMetallicRoughness": {"metallicFactor": 0.25, "roughnessFactor": 0.5}, "emissiveFactor": [1, 0.5, 0],
             "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 4}}},
         {"pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0.25]}, "emissiveFactor": [1, 1, 1], "alphaMode": "BLEND"},
+        {"pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0.5], "baseColorTexture": {"index": 0},
+                "metallicRoughnessTexture": {"index": 1}},
+            "normalTexture": {"index": 1, "scale": 0.5}, "occlusionTexture": {"index": 0},
+            "emissiveFactor": [1, 1, 1], "emissiveTexture": {"index": 2}, "alphaMode": "MASK", "alphaCutoff": 0.2},
         {"pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0.25], "metallicRoughnessTexture": {"index": 0}},
-            "emissiveFactor": [1, 1, 1], "emissiveTexture": {"index": 0}, "alphaMode": "MASK", "alphaCutoff": 0.2},
-        {"pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0.25]}, "alphaMode": "MASK"},
-        {"extensions": {"KHR_materials_pbrSpecularGlossiness": {"glossinessFactor": 0.75}}}]);
-    let loaded = decode("test.gltf", &document.text(), &ReadOptions::BARE).unwrap();
-    let values = |name: &str| {
-        let named = loaded.mesh.attributes.iter().find(|a| a.name == name);
-        let attribute = named.unwrap();
-        // Of two triangles a primitive.
-        (0..6)
-            .map(|i| attribute.row(2 * i).to_vec())
-            .collect::<Vec<_>>()
+            "alphaMode": "MASK"},
+        {"extensions": {"KHR_materials_pbrSpecularGlossiness": {"glossinessFactor": 0.75}}},
+        {"pbrMetallicRoughness": {"metallicFactor": 0.25, "roughnessFactor": 0.5, "baseColorFactor": [1, 0, 0, 1]},
+            "emissiveFactor": [1, 0.5, 0], "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 4}}}]);
+    let loaded = decode("here/test.gltf", &document.text(), &ReadOptions::BARE).unwrap();
+    let surface = |roughness, metallic| Surface {
+        roughness,
+        metallic,
+        ..Surface::MATTE
     };
-    let numbers = |name: &str| values(name).concat();
-    assert_eq!(numbers("face_roughness"), [0.5, 1.0, 1.0, 1.0, 0.25, 1.0]);
-    assert_eq!(numbers("face_metallic"), [0.25, 1.0, 0.0, 1.0, 0.0, 1.0]);
-    assert_eq!(numbers("face_opacity"), [1.0, 0.25, 1.0, 0.0, 1.0, 1.0]);
-    let emission = values("face_emission");
-    assert_eq!(emission[..3], [[4.0, 2.0, 0.0], [0.25; 3], [0.0; 3]]);
-    // White, and not without a colour.
-    assert_eq!(values("face_color"), [[1.0; 3]; 6]);
+    let image = Map::of("here/there/a b.png".into());
+    let inside = Map {
+        image: Some(1),
+        wrap: ["clamp", "repeat"],
+        nearest: true,
+        ..Map::of("here/test.gltf".into())
+    };
+    let expected = [
+        Surface {
+            emission: [4.0, 2.0, 0.0],
+            ..surface(0.5, 0.25)
+        },
+        Surface {
+            emission: [0.25; 3],
+            opacity: 0.25,
+            ..surface(1.0, 1.0)
+        },
+        Surface {
+            cutoff: Some(0.4),
+            maps: Maps {
+                color: Some(image.clone()),
+                roughness: Some(inside.by("g")),
+                metallic: Some(inside.by("b")),
+                opacity: Some(image.by("a")),
+                normal: Some(inside),
+                normal_scale: 0.5,
+                ..Maps::NONE
+            },
+            ..surface(1.0, 1.0)
+        },
+        // No metal, for nobody knows where.
+        Surface {
+            opacity: 0.0,
+            ..surface(1.0, 0.0)
+        },
+        surface(0.25, 0.0),
+        surface(1.0, 1.0),
+    ];
+    assert_eq!(loaded.surfaces, expected);
+    let named = |name: &str| loaded.mesh.attributes.iter().find(|a| a.name == name);
+    let of_faces = &named("face_surface").unwrap().values;
+    // Of two triangles a primitive; what differs in colour alone is one.
+    let numbers: Vec<f32> = of_faces.chunks(2).map(|pair| pair[0]).collect();
+    assert_eq!(numbers, [0.0, 1.0, 2.0, 3.0, 4.0, 0.0, 5.0]);
+    let colors = &named("face_color").unwrap().values;
+    assert_eq!(colors[30..36], [1.0, 0.0, 0.0, 1.0, 0.0, 0.0]);
+    assert_eq!(loaded.of_surface(0).unwrap().triangles.len(), 4);
+    assert_eq!(loaded.color_of(0), None);
+    assert_eq!(loaded.color_of(1), Some([1.0; 3]));
+    assert!(loaded.of_surface(6).is_none());
     let [told] = &loaded.warnings[..] else {
         panic!("{:?}", loaded.warnings);
     };
-    let expected = "materials are shown by their factors alone, without KHR_materials_pbrSpecularGlossiness, textures";
+    let expected = "materials are shown without KHR_materials_pbrSpecularGlossiness, textures EXT_texture_webp, \
+        textures where there are no texture coordinates";
     assert!(told.to_string().contains(expected), "{told}");
     let as_shape = document.mesh().attributes;
     assert!(as_shape.len() == 1 && as_shape[0].name == "face_color");
-    // What is a texture's has no colour of its own.
-    document.json["materials"] =
+    // White is no colour of its own where an image has the say.
+    let mut textured = Document::rectangle();
+    let uvs = json!({"componentType": 5126, "count": 4, "type": "VEC2"});
+    textured.attribute("TEXCOORD_0", &[0; 32], uvs);
+    textured.primitive()["material"] = 0.into();
+    textured.json["images"] = json!([{"uri": "a.png"}]);
+    textured.json["textures"] = json!([{"source": 0}]);
+    textured.json["materials"] =
         json!([{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}]);
-    document.json["meshes"][0]["primitives"]
-        .as_array_mut()
-        .unwrap()
-        .truncate(1);
-    let loaded = decode("test.gltf", &document.text(), &ReadOptions::BARE).unwrap();
-    assert!(
-        loaded
-            .mesh
-            .attributes
-            .iter()
-            .all(|a| a.name != "face_color")
-    );
+    let loaded = decode("test.gltf", &textured.text(), &ReadOptions::BARE).unwrap();
+    assert!(loaded.mesh.attributes.is_empty() && loaded.warnings.is_empty());
+    assert_eq!(loaded.color_of(0), None);
 }
 
 #[test]

@@ -17,6 +17,7 @@ use super::colors;
 use super::mtl::{BARE_COLOR, Materials};
 use super::polygon::Polygons;
 use super::read::{Decoded, Input, ReadOptions};
+use super::surface::{Maps, Surface, Surfaces};
 use super::{Attribute, Mesh, Per};
 use crate::error::{Error, Location, Result};
 use blocks::{Block, Blocks, CUTS, Cuts};
@@ -58,15 +59,23 @@ fn read_in(cuts: Cuts, input: Input<'_>, options: &ReadOptions) -> Result<Decode
     if materials && !obj.uses.is_empty() {
         account.take_rows(obj.triangles.len() as u64, size_of::<[f32; 3]>())?;
     }
-    let colors = materials.then(|| obj.face_colors(path));
+    let made = materials.then(|| obj.made_of(path, options));
     let mut decoded = obj.finish(options);
-    if let Some(FaceColors {
-        attribute,
+    if let Some(MadeOf {
+        colors,
+        surfaces,
         warnings,
         files,
-    }) = colors
+    }) = made
     {
-        decoded.mesh.attributes.extend(attribute);
+        decoded.mesh.attributes.extend(colors);
+        if let Some((surfaces, runs)) = surfaces {
+            decoded.surfaces = surfaces.of_faces(&mut decoded.mesh, &runs);
+        }
+        if decoded.surfaces.len() > 1 && decoded.mesh.normals.is_empty() {
+            // Smooth across surfaces, which are seen one by one.
+            decoded.mesh.compute_normals();
+        }
         decoded.warnings.extend(warnings);
         decoded.files = files;
     }
@@ -120,9 +129,11 @@ struct Use {
 }
 
 /// What the materials of a file come to.
-struct FaceColors {
+struct MadeOf {
     /// `None`: no face has a colour.
-    attribute: Option<Attribute>,
+    colors: Option<Attribute>,
+    /// With how many faces in turn have each; `None`: all are matte.
+    surfaces: Option<(Surfaces, Vec<(usize, u32)>)>,
     warnings: Vec<String>,
     /// The libraries.
     files: Vec<PathBuf>,
@@ -211,9 +222,9 @@ impl Obj {
         Ok(vertex)
     }
 
-    /// The colour of each face's material, from the libraries beside the file `path`.
-    fn face_colors(&self, path: &Path) -> FaceColors {
-        let mut materials = Materials::read(path, &self.libraries);
+    /// What the faces are made of, by the libraries beside the file `path`.
+    fn made_of(&self, path: &Path, options: &ReadOptions) -> MadeOf {
+        let mut materials = Materials::read(path, &self.libraries, options.bare);
         let mut warnings = std::mem::take(&mut materials.warnings);
         let unknown = (self.uses.iter()).find(|u| !u.name.is_empty() && !materials.has(&u.name));
         if let (Some(Use { name, .. }), false) = (unknown, self.libraries.is_empty()) {
@@ -223,12 +234,63 @@ impl Obj {
         let colors: Vec<_> = (self.uses.iter())
             .map(|u| materials.color(&u.name))
             .collect();
-        let attribute = colors.iter().any(Option::is_some).then(|| {
-            let mut values = BARE_COLOR.repeat(self.uses[0].from);
-            let ends = self.uses[1..].iter().map(|u| u.from);
-            let ends = ends.chain([self.triangles.len()]);
-            for ((u, color), end) in self.uses.iter().zip(colors).zip(ends) {
-                values.extend(color.unwrap_or(BARE_COLOR).repeat(end - u.from));
+        let ends = self.uses.iter().skip(1).map(|u| u.from);
+        let ends = ends.chain([self.triangles.len()]);
+        let counts: Vec<usize> = (self.uses.iter().zip(ends))
+            .map(|(u, end)| end - u.from)
+            .collect();
+        let before = self.uses.first().map_or(0, |u| u.from);
+        let mut surfaces = Surfaces::default();
+        let mut runs = Vec::new();
+        if before > 0 {
+            runs.push((before, surfaces.number(Surface::MATTE)));
+        }
+        // Faces without texture coordinates show no image.
+        let plain = |face: usize| {
+            let corners = self.triangles[face];
+            corners
+                .iter()
+                .any(|&i| self.vertices[i as usize][1] == NONE)
+        };
+        let mut bare_maps = false;
+        let mut known: HashMap<(&[u8], bool), u32> = HashMap::new();
+        for (used, count) in self.uses.iter().zip(&counts) {
+            let mut number = |is_plain: bool| {
+                *known.entry((&used.name, is_plain)).or_insert_with(|| {
+                    let mut surface = materials.surface(&used.name);
+                    if is_plain && surface.maps != Maps::NONE {
+                        surface.maps = Maps::NONE;
+                        bare_maps = true;
+                    }
+                    surfaces.number(surface)
+                })
+            };
+            let mut faces = used.from..used.from + count;
+            while let Some(first) = faces.next() {
+                let is_plain = plain(first);
+                let alike = faces
+                    .clone()
+                    .take_while(|&face| plain(face) == is_plain)
+                    .count();
+                faces.start += alike;
+                runs.push((1 + alike, number(is_plain)));
+            }
+        }
+        if bare_maps {
+            warnings.push(
+                "images of materials are not shown on faces without texture coordinates".to_owned(),
+            );
+        }
+        if surfaces.too_many {
+            warnings.push(
+                "materials beyond the first 1024 of different look are shown as the last of those"
+                    .to_owned(),
+            );
+        }
+        let colors = colors.iter().any(Option::is_some).then(|| {
+            let mut values = BARE_COLOR.repeat(before);
+            for (color, count) in colors.iter().zip(&counts) {
+                values.extend(color.unwrap_or(BARE_COLOR).repeat(*count));
             }
             Attribute {
                 name: "face_color".to_owned(),
@@ -237,8 +299,9 @@ impl Obj {
                 values,
             }
         });
-        FaceColors {
-            attribute,
+        MadeOf {
+            colors,
+            surfaces: (!surfaces.is_all_matte()).then_some((surfaces, runs)),
             warnings,
             files: materials.libraries,
         }
@@ -399,7 +462,10 @@ mod tests {
         assert_eq!(attribute.values, wanted.concat());
         let said: Vec<_> = loaded.warnings.iter().map(|w| w.to_string()).collect();
         assert!(said[0].contains("absent.mtl cannot be read"), "{said:?}");
-        assert!(said[1].contains("map_Kd is not shown"), "{said:?}");
+        assert!(
+            said[1].contains("not shown of the materials: map_Kd"),
+            "{said:?}"
+        );
         assert_eq!(said.len(), 2, "{said:?}");
     }
 
@@ -408,7 +474,7 @@ mod tests {
         let loaded = with_libraries("newmtl green\nKd 0 1 0\n", "newmtl red\nKd so red\n");
         assert!(loaded.mesh.attributes.is_empty());
         let said: Vec<_> = loaded.warnings.iter().map(|w| w.to_string()).collect();
-        assert!(said[1].contains("1 lines Kd passed over"), "{said:?}");
+        assert!(said[1].contains("1 lines passed over"), "{said:?}");
         assert!(said[2].contains("no library has the material"), "{said:?}");
         assert!(said[2].contains("dark blue"), "{said:?}");
     }

@@ -1,11 +1,14 @@
 //! PLY: any order and type of properties, ASCII and binary of both endians. Rows of fixed size are decoded
 //! column by column, in parallel, straight from the buffer; ASCII rows, and those with lists, are first written
 //! out as rows of f64, so that one decoder serves all. Polygons are fans around their first corner; elements other
-//! than `vertex` and `face` are skipped. Texture coordinates are `u v`, `s t` or `texture_u texture_v`.
+//! than `vertex` and `face` are skipped. Texture coordinates are `u v`, `s t` or `texture_u texture_v`, and of a bare mesh also
+//! those of faces' corners, `texcoord`.
 
 mod attributes;
 mod header;
+mod pictures;
 mod rows;
+mod wedges;
 mod write;
 
 use glam::{DVec3, Vec2, Vec3};
@@ -28,7 +31,7 @@ const ROWS: u64 = 1 << 10;
 const BLOCK: usize = 1 << 22;
 
 pub(super) fn read(input: Input<'_>, options: &ReadOptions) -> Result<Decoded> {
-    let origin = input.origin;
+    let (origin, path) = (input.origin, input.path);
     let mut source = Source::new(input);
     let header = Header::read(&mut source)?;
     for wanted in header::WANTED {
@@ -48,6 +51,8 @@ pub(super) fn read(input: Input<'_>, options: &ReadOptions) -> Result<Decoded> {
         bare: options.bare,
         origin,
         widest: 0,
+        wedges: Vec::new(),
+        texnumbers: Vec::new(),
         decoded: Decoded {
             polygons: Polygons::new(options.bare),
             ..Decoded::default()
@@ -76,6 +81,12 @@ pub(super) fn read(input: Input<'_>, options: &ReadOptions) -> Result<Decoded> {
         }
     }
     let mut decoded = ply.decoded;
+    if options.bare && !ply.wedges.is_empty() {
+        wedges::settle(&mut decoded.mesh, &ply.wedges, ply.source.account)?;
+    }
+    if options.bare && !header.pictures.is_empty() {
+        pictures::show(&mut decoded, &header.pictures, &ply.texnumbers, path);
+    }
     if options.flip_tex_coords.unwrap_or(false) {
         decoded.mesh.flip_uvs();
     }
@@ -93,8 +104,15 @@ struct Ply<'a> {
     origin: DVec3,
     /// Bytes that are taken for a face's corners.
     widest: u64,
+    /// Texture coordinates of the triangles' corners, where faces have them.
+    wedges: Vec<[Vec2; 3]>,
+    /// Which image triangles have, where faces say so.
+    texnumbers: Vec<f64>,
     decoded: Decoded,
 }
+
+/// The list of texture coordinates of a face's corners, u and v in turn.
+const WEDGES: &str = "texcoord";
 
 impl Ply<'_> {
     fn say_what_is_left_out(&mut self, header: &Header) {
@@ -114,15 +132,15 @@ impl Ply<'_> {
                 matches!(property.kind, Kind::List { .. })
                     && !(name == "face" && is_corners(property))
             });
-            warnings.extend(lists.map(|list| match list.name.as_str() {
-                "texcoord" => format!(
-                    "list \"texcoord\" of element {name:?} left out: texture coordinates are those of vertices, s and t"
+            let is_wedges = |list: &str| name == "face" && list == WEDGES;
+            let lists = lists.map(|list| list.name.as_str());
+            let lists = lists.filter(|list| !(self.bare && is_wedges(list)));
+            warnings.extend(lists.map(|list| match is_wedges(list) {
+                true => format!(
+                    "list {list:?} of element {name:?} left out: texture coordinates are those of vertices, s and t"
                 ),
-                list => format!("list {list:?} of element {name:?} left out"),
+                false => format!("list {list:?} of element {name:?} left out"),
             }));
-        }
-        if let (true, Some(picture)) = (self.bare, header.pictures.first()) {
-            warnings.push(format!("the picture {picture:?} is not shown"));
         }
     }
 
@@ -274,7 +292,7 @@ impl Ply<'_> {
             bytes.clear();
             let some = left.min(ROWS);
             for _ in 0..some {
-                self.read_row(element, &mut scalars, None)?;
+                self.read_row(element, &mut scalars, &mut [])?;
                 bytes.extend(scalars.iter().flat_map(|s: &f64| s.to_le_bytes()));
             }
             each(Rows {
@@ -302,9 +320,10 @@ impl Ply<'_> {
                 .source
                 .error("the corners of a face must be whole numbers"));
         }
+        let texnumber = element.scalar("texnumber").filter(|_| self.bare);
         let wanted = Wanted {
             prefix: "face_",
-            taken: &[],
+            taken: texnumber.as_slice(),
             bare: self.bare,
         };
         let plans = attributes::plan(element, &wanted, &mut self.decoded.warnings);
@@ -319,7 +338,12 @@ impl Ply<'_> {
             };
         let fitting = element.count.min(self.source.remaining() / triangle + 1);
         let fitting = usize::try_from(fitting).expect("the file holds so many rows");
+        let wedges = element
+            .properties
+            .iter()
+            .position(|p| self.bare && p.name == WEDGES && matches!(p.kind, Kind::List { .. }));
         let numbers: usize = sources.iter().map(Vec::len).sum();
+        let numbers = numbers + wedges.map_or(0, |_| 6) + texnumber.map_or(0, |_| 2);
         let row = size_of::<[u32; 3]>() + numbers * size_of::<f32>();
         self.take(fitting, row)?;
         let mut room = fitting;
@@ -330,8 +354,10 @@ impl Ply<'_> {
             && count.size() == 1
             && item.size() == 4
             && self.encoding != Encoding::Ascii;
-        let (mut scalars, mut polygon) = (Vec::new(), Vec::new());
-        let (mut degenerate, mut face) = (0_u64, 0);
+        let mut scalars = Vec::new();
+        let mut lists = vec![List::at(corners)];
+        lists.extend(wedges.map(List::at));
+        let (mut degenerate, mut unfit, mut face) = (0_u64, 0_u64, 0);
         while face < element.count {
             if common {
                 face += self.read_triangles(element.count - face, &mut triangles)?;
@@ -339,13 +365,14 @@ impl Ply<'_> {
                     break;
                 }
             }
-            self.read_row(element, &mut scalars, Some((corners, &mut polygon)))
+            self.read_row(element, &mut scalars, &mut lists)
                 .map_err(|e| {
                     e.help(format!(
                         "{} faces were promised, and this is face {face}",
                         element.count
                     ))
                 })?;
+            let polygon = &lists[0].items;
             if let Some(&wrong) = polygon
                 .iter()
                 .find(|&&i| !(i >= 0.0 && i < self.vertices as f64 && i.fract() == 0.0))
@@ -364,8 +391,20 @@ impl Ply<'_> {
             polygons.push(triangles.len(), polygon.len());
             // In range of `vertices`, which fits into 32 bits.
             let at = |i: usize| polygon[i] as u32;
+            let uvs = lists.get(1).map(|list| &list.items);
+            let fits = uvs.is_none_or(|uvs| uvs.len() == 2 * polygon.len());
+            unfit += u64::from(!fits);
+            let uv = |i: usize| match uvs {
+                Some(uvs) if fits => Vec2::new(uvs[2 * i] as f32, uvs[2 * i + 1] as f32),
+                _ => Vec2::ZERO,
+            };
             for i in 2..polygon.len() {
                 triangles.push([at(0), at(i - 1), at(i)]);
+                if wedges.is_some() {
+                    self.wedges.push([uv(0), uv(i - 1), uv(i)]);
+                }
+                self.texnumbers
+                    .extend(texnumber.map(|place| scalars[place]));
                 for (attribute, sources) in attributes.iter_mut().zip(&sources) {
                     attribute
                         .values
@@ -378,6 +417,11 @@ impl Ply<'_> {
             let warning =
                 format!("{degenerate} faces left out: they have fewer than three corners");
             self.decoded.warnings.push(warning);
+        }
+        if unfit > 0 {
+            self.decoded.warnings.push(format!(
+                "{unfit} faces have not two texture coordinates a corner: 0 stands for them"
+            ));
         }
         self.divide_colors(&mut attributes, &ranges);
         self.decoded.mesh.triangles = triangles;
@@ -445,12 +489,12 @@ impl Ply<'_> {
         }
     }
 
-    /// Reads one row: its scalars, one a property (0 for a list), and the list that is wanted.
+    /// Reads one row: its scalars, one a property (0 for a list), and the lists that are wanted.
     fn read_row(
         &mut self,
         element: &Element,
         scalars: &mut Vec<f64>,
-        mut wanted: Option<(usize, &mut Vec<f64>)>,
+        wanted: &mut [List],
     ) -> Result<()> {
         scalars.clear();
         for (i, property) in element.properties.iter().enumerate() {
@@ -479,14 +523,14 @@ impl Ply<'_> {
                         )));
                     }
                     let length = length as u64;
-                    match &mut wanted {
-                        Some((place, list)) if *place == i => {
-                            list.clear();
+                    match wanted.iter_mut().find(|list| list.place == i) {
+                        Some(List { items, .. }) => {
+                            items.clear();
                             let bytes = length.saturating_mul(2 * size_of::<f64>() as u64);
                             self.source.account.cover(&mut self.widest, bytes)?;
                             for _ in 0..length {
                                 let value = self.read_scalar(item)?;
-                                list.push(value);
+                                items.push(value);
                             }
                         }
                         _ if self.encoding == Encoding::Ascii => {
@@ -525,7 +569,7 @@ impl Ply<'_> {
                 .skip(element.count.saturating_mul(stride as u64)),
             _ => {
                 let mut scalars = Vec::new();
-                (0..element.count).try_for_each(|_| self.read_row(element, &mut scalars, None))
+                (0..element.count).try_for_each(|_| self.read_row(element, &mut scalars, &mut []))
             }
         }
     }
@@ -552,6 +596,22 @@ impl Ply<'_> {
         self.source.error(format!(
             "face {face}: vertex index {index} is out of range; the file {range}"
         ))
+    }
+}
+
+/// A list that is read.
+struct List {
+    /// Of its property.
+    place: usize,
+    items: Vec<f64>,
+}
+
+impl List {
+    fn at(place: usize) -> Self {
+        Self {
+            place,
+            items: Vec::new(),
+        }
     }
 }
 

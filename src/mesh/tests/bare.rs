@@ -140,7 +140,15 @@ fn what_is_left_out_is_said_once() {
         "{scene}"
     );
     let bare_one = said_of(bare("a.ply", ply.as_bytes()));
-    assert!(bare_one.contains("skin.png"), "{bare_one}");
+    assert!(
+        !bare_one.contains("texcoord") && bare_one.contains("\"edge\""),
+        "{bare_one}"
+    );
+    let without = ply
+        .replace("property list uchar float texcoord\n", "")
+        .replace(" 6 0 0 1 0 1 1", "");
+    let bare_one = said_of(bare("a.ply", without.as_bytes()));
+    assert!(bare_one.contains("\"skin.png\" is not shown"), "{bare_one}");
     let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nl 1 2\np 1\nl 2 3\nsurf 0 1 0 1 1 2 3\n";
     let of_obj = said_of(bare("a.obj", obj.as_bytes()));
     assert!(
@@ -385,12 +393,53 @@ fn the_shared_faults_are_mended() {
         "silently-left-out/meshlab-wedge.ply",
         "bare-colours-dropped/a4_wedge.ply",
     ] {
-        let said = read_parts(&faults.join(name), &Budget::default())
-            .unwrap()
-            .warnings;
+        let of =
+            |options: ReadOptions| read(&faults.join(name), &options, &Budget::default()).unwrap();
+        let as_shape = of(ReadOptions::default());
+        let told = as_shape.warnings.iter().map(ToString::to_string);
         assert!(
-            said.iter().any(|w| w.to_string().contains("texcoord")),
-            "{said:?}"
+            told.into_iter().any(|w: String| w.contains("texcoord")),
+            "{name}"
         );
+        let bare = of(ReadOptions::BARE);
+        assert!(bare.warnings.is_empty(), "{name}: {:?}", bare.warnings);
+        assert_eq!(bare.mesh.uvs.len(), bare.mesh.positions.len(), "{name}");
     }
+}
+
+/// As MeshLab writes it: texture coordinates of corners, and two images.
+#[test]
+fn corners_of_ply_faces_have_texture_coordinates_of_their_own() {
+    let ply = "ply\nformat ascii 1.0\ncomment TextureFile one.png\ncomment TextureFile two.png\nelement vertex 4\n\
+        property float x\nproperty float y\nproperty float z\nproperty float quality_0\nelement face 3\n\
+        property list uchar int vertex_indices\nproperty list uchar float texcoord\nproperty int texnumber\nend_header\n\
+        0 0 0 1\n1 0 0 2\n1 1 0 3\n0 1 0 4\n\
+        3 0 1 2 6 0 0 1 0 1 1 0\n3 0 2 3 6 0 0 0.5 0.5 0 1 1\n3 0 2 3 6 0 0 0.5 0.5 0 1 -1\n";
+    let loaded = decode("there/a.ply", ply.as_bytes(), &ReadOptions::BARE).unwrap();
+    let mesh = &loaded.mesh;
+    // Corner 2 differs between the first two faces, and is shared by the last two.
+    assert_eq!(mesh.triangles, [[0, 1, 2], [0, 4, 3], [0, 4, 3]]);
+    let uvs = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.5, 0.5]];
+    assert_eq!(mesh.uvs, uvs.map(Vec2::from_array));
+    assert_eq!(mesh.positions[4], mesh.positions[2]);
+    assert_eq!(mesh.normals, [Vec3::Z; 5]);
+    let quality = mesh.attributes.iter().find(|a| a.name == "vertex_quality");
+    assert_eq!(quality.unwrap().values, [1.0, 2.0, 3.0, 4.0, 3.0]);
+    let images = loaded.surfaces.iter().map(|s| s.maps.color.as_ref());
+    let names: Vec<_> = images
+        .map(|image| Some(image?.path.file_name()?.to_owned()))
+        .collect();
+    assert_eq!(
+        names,
+        [Some("one.png".into()), Some("two.png".into()), None]
+    );
+    assert_eq!(loaded.of_surface(1).unwrap().uvs[1], Vec2::new(0.5, 0.5));
+    assert!(loaded.warnings.is_empty());
+    let short = ply.replace("6 0 0 1 0 1 1 0", "4 0 0 1 0 0");
+    let loaded = decode("a.ply", short.as_bytes(), &ReadOptions::BARE).unwrap();
+    assert!(
+        loaded.warnings[0]
+            .to_string()
+            .contains("1 faces have not two texture coordinates a corner")
+    );
 }

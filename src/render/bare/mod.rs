@@ -1,6 +1,6 @@
 //! A bare mesh as a scene: framed by its own camera (glTF) or an automatic one, on a ground, under a soft sky
-//! and a key light or the file's own lights (glTF), in the colours of its vertices, faces or materials where the file has any,
-//! or of its materials (glTF). The ground is a little
+//! and a key light or the file's own lights (glTF), as its materials say or in the colours of its vertices or faces where the file has
+//! any: a shape for each look. The ground is a little
 //! lower than the mesh, so that what is flat does not lie in it.
 
 mod frame;
@@ -22,6 +22,7 @@ use crate::mesh::{
 };
 use frame::FOV;
 use staging::point;
+use surface::Body;
 
 pub use staging::{Background, Finish, Lighting, Staging, UpAxis};
 
@@ -139,34 +140,49 @@ pub fn describe_mesh(
         let warning = Error::input(message).at(&Location::of_file(path));
         loaded.warnings.extend_from_slice(warning.problems());
     }
-    let subject = Subject {
+    if let (Lighting::Environment(_), Background::Color(_)) =
+        (&staging.lighting, staging.background)
+    {
+        let message =
+            "what is seen beside the mesh is the image that lights it: --background is left out";
+        let warning = Error::input(message).at(&Location::of_file(path));
+        loaded.warnings.extend_from_slice(warning.problems());
+    }
+    let surfaces = surface::own(&mut loaded, staging, budget, &Location::of_file(path));
+    let mut subject = Subject {
         plugin,
         bounds,
         camera: camera.and_then(|camera| own_camera(&camera, staging.aspect)),
         lights: &lights,
         mesh: &loaded.mesh,
+        bodies: surface::bodies(&loaded, &surfaces),
+        integrator: surface::integrator(&surfaces),
         staging,
     };
-    let material = match surface::material(&loaded.mesh, staging) {
-        Some(own) => own,
-        None => staging.material(|name| color(&loaded.mesh, name)),
-    };
+    if surfaces.is_empty() {
+        subject.bodies.push(Body {
+            surface: None,
+            material: staging.material(|name| color(&loaded.mesh, name)),
+            emitter: String::new(),
+        });
+    }
     let name = Path::new(path.file_name().unwrap_or_default());
-    let text = scene(&subject, name, true, &material);
+    let text = scene(&subject, name, true);
     let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
-    // Only these formats' materials are colours.
-    let colored = matches!(plugin, "obj" | "gltf");
-    let bare = colored
-        && loaded
-            .mesh
-            .attributes
-            .iter()
-            .any(|a| a.name.starts_with("face_"));
-    let material = match &own {
-        Some((file, bsdf)) => file.written(*bsdf),
-        None => material,
+    // What of these the scene needs only a bare file has; texture coordinates of PLY files may be those of corners.
+    let bare = match plugin {
+        "gltf" => true,
+        "ply" => !surfaces.is_empty(),
+        "obj" => {
+            let mut attributes = loaded.mesh.attributes.iter();
+            surfaces.len() > 1 || attributes.any(|a| a.name.starts_with("face_"))
+        }
+        _ => false,
     };
-    let written = scene(&subject, &absolute, bare, &material);
+    if let Some((file, bsdf)) = &own {
+        subject.bodies[0].material = file.written(*bsdf);
+    }
+    let written = scene(&subject, &absolute, bare);
     // What is written here is nobody's to be refused.
     let options = Options {
         strict: false,
@@ -198,6 +214,9 @@ struct Subject<'a> {
     /// That light it, in place of what else there is.
     lights: &'a [GltfLight],
     mesh: &'a Mesh,
+    /// What of it is made of what; one at least.
+    bodies: Vec<Body>,
+    integrator: &'static str,
     staging: &'a Staging,
 }
 
@@ -268,14 +287,12 @@ fn unseen(mesh: &Mesh) -> Vec<String> {
 
 /// The mesh's own colours as a texture of this name.
 fn color(mesh: &Mesh, name: &str) -> Option<String> {
-    Some(surface::texture(name, &colors(mesh).next()?.name))
+    Some(surface::attribute(name, &colors(mesh).next()?.name))
 }
 
-/// The scene around the mesh that the shape reads from `file`, `bare` with its materials' colours, and that is made of
-/// `material`.
-fn scene(subject: &Subject<'_>, file: &Path, bare: bool, material: &str) -> String {
+/// The scene around the mesh that the shape reads from `file`, `bare` with what that says of materials.
+fn scene(subject: &Subject<'_>, file: &Path, bare: bool) -> String {
     let Subject {
-        plugin,
         bounds: (min, max),
         mesh,
         staging,
@@ -335,12 +352,7 @@ fn scene(subject: &Subject<'_>, file: &Path, bare: bool, material: &str) -> Stri
         <film type="hdrfilm"><integer name="width" value="1024"/><integer name="height" value="768"/>{pixels}</film>
         <sampler type="stratified"><integer name="sample_count" value="64"/></sampler>
     </sensor>
-    {lights}{ground}
-    <shape type="{plugin}">
-        <string name="filename" value="{file}"/>
-        <boolean name="face_normals" value="{flat}"/>{bare}
-        {material}{emission}
-    </shape>
+    {lights}{ground}{bodies}
 </scene>"#,
         lights = staging.lights(center, radius, key, subject.lights),
         ground = if staging.has_ground() {
@@ -348,22 +360,49 @@ fn scene(subject: &Subject<'_>, file: &Path, bare: bool, material: &str) -> Stri
         } else {
             String::new()
         },
-        file = escaped(&file.to_string_lossy()),
-        // A glTF without normals is meant to be flat; other formats leave them to be computed, which would round off the
-        // parts of machines that STL is for.
-        flat = match plugin {
-            "gltf" => mesh.normals.is_empty(),
-            "stl" => upright::is_angular(mesh),
-            _ => false,
-        },
-        integrator = surface::integrator(mesh, staging),
-        emission = surface::emission(mesh, staging),
-        bare = if bare {
-            "\n        <boolean name=\"bare\" value=\"true\"/>"
-        } else {
-            ""
-        },
+        integrator = subject.integrator,
+        bodies = bodies(subject, file, bare),
     )
+}
+
+/// The mesh, as one shape or several.
+fn bodies(subject: &Subject<'_>, file: &Path, bare: bool) -> String {
+    let Subject {
+        plugin,
+        mesh,
+        bodies,
+        ..
+    } = subject;
+    // A glTF without normals is meant to be flat; other formats leave them to be computed, which would round off the
+    // parts of machines that STL is for.
+    let flat = match *plugin {
+        "gltf" => mesh.normals.is_empty(),
+        "stl" => upright::is_angular(mesh),
+        _ => false,
+    };
+    let file = escaped(&file.to_string_lossy());
+    let line = |text: &str| format!("\n        {text}");
+    let shapes = bodies.iter().map(|body| {
+        let mut more = String::new();
+        if bare {
+            more += &line(r#"<boolean name="bare" value="true"/>"#);
+        }
+        if let Some(surface) = body.surface {
+            more += &line(&format!(r#"<integer name="surface" value="{surface}"/>"#));
+        }
+        more += &line(&body.material);
+        if !body.emitter.is_empty() {
+            more += &line(&body.emitter);
+        }
+        format!(
+            r#"
+    <shape type="{plugin}">
+        <string name="filename" value="{file}"/>
+        <boolean name="face_normals" value="{flat}"/>{more}
+    </shape>"#
+        )
+    });
+    shapes.collect()
 }
 
 /// The ground under a mesh that lies above `min`.
@@ -476,7 +515,6 @@ mod tests {
             !diffuse.children(Kind::Texture).is_empty()
         };
         assert!(mesh(&describe("colored.ply", PLY)));
-        assert!(mesh(&describe("colored.gltf", GLTF)));
         let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
         assert!(!mesh(&describe("plain.obj", obj)));
     }
@@ -503,15 +541,15 @@ mod tests {
             )
         };
         let of = |named: &str, textures, emitters| (named.to_owned(), textures, emitters);
-        assert_eq!(parts("", ""), of("path twosided principled", 3, 0));
+        assert_eq!(parts("", ""), of("path twosided principled", 0, 0));
         let matte = r#","metallicFactor":0"#;
-        assert_eq!(parts(matte, ""), of("path twosided diffuse", 1, 0));
+        assert_eq!(parts(matte, ""), of("path twosided diffuse", 0, 0));
         let cut = r#","alphaMode":"MASK","alphaCutoff":2,"emissiveFactor":[1,1,1]"#;
         // Nothing of it is left to shine.
-        let expected = of("volpath mask twosided diffuse", 1, 0);
+        let expected = of("volpath mask twosided diffuse", 0, 0);
         assert_eq!(parts(matte, cut), expected);
         let shining = r#","emissiveFactor":[0,0,1]"#;
-        assert_eq!(parts(matte, shining), of("path twosided diffuse", 1, 1));
+        assert_eq!(parts(matte, shining), of("path twosided diffuse", 0, 1));
     }
 
     #[test]

@@ -43,7 +43,7 @@ impl UpAxis {
 /// What a bare mesh is made of.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Finish {
-    /// By the factors of its own materials (glTF), or else clay.
+    /// As its file says, or else clay.
     #[default]
     Auto,
     /// Matte, in its own colours or those of clay.
@@ -115,6 +115,8 @@ pub struct Staging {
     pub background: Background,
     /// Whether it stands on a ground.
     pub ground: bool,
+    /// Whether its file's animation is seen while a shutter is open.
+    pub deforms: bool,
 }
 
 impl Default for Staging {
@@ -132,6 +134,7 @@ impl Default for Staging {
             lighting: Lighting::Auto,
             background: Background::Sky,
             ground: true,
+            deforms: false,
         }
     }
 }
@@ -143,9 +146,10 @@ impl Staging {
         angles.iter().any(Option::is_some) || self.target.is_some()
     }
 
-    /// Whether there is a ground.
+    /// Whether there is a ground: from below it would be all that is seen.
     pub(super) fn has_ground(&self) -> bool {
-        self.ground && self.background != Background::Transparent
+        let is_below = self.elevation.is_some_and(|elevation| elevation < 0.0);
+        self.ground && !is_below && self.background != Background::Transparent
     }
 
     /// The scene file of the mesh's material, and that material, where it comes from a file. `options` and `budget` are for
@@ -285,7 +289,7 @@ impl Staging {
 }
 
 /// An image's file as a scene file has it, wherever that stands.
-fn filename(path: &Path) -> String {
+pub(super) fn filename(path: &Path) -> String {
     let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
     let path = escaped(&path.to_string_lossy());
     format!(r#"<string name="filename" value="{path}"/>"#)
