@@ -11,7 +11,7 @@ use super::{Attribute, Mesh, Per};
 pub(super) const FACE_SURFACE: &str = "face_surface";
 
 /// No file has more: each becomes a shape.
-pub(super) const MOST_SURFACES: usize = 1 << 10;
+const MOST_SURFACES: usize = 1 << 10;
 
 /// A material beside its base colour.
 #[derive(Clone, Debug, PartialEq)]
@@ -157,7 +157,7 @@ impl Map {
 pub(super) struct Surfaces {
     list: Vec<Surface>,
     /// Whether there were more than are kept.
-    pub(super) too_many: bool,
+    too_many: bool,
 }
 
 impl Surfaces {
@@ -173,6 +173,13 @@ impl Surfaces {
             self.list.len() - 1
         });
         number as u32
+    }
+
+    /// What is to be told where there were more than are kept.
+    pub(super) fn excess(&self) -> Option<&'static str> {
+        (self.too_many).then_some(
+            "materials beyond the first 1024 of different look are shown as the last of those",
+        )
     }
 
     /// Whether they have nothing to say.

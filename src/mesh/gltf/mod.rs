@@ -234,10 +234,8 @@ pub(super) fn read(input: Input<'_>, options: &ReadOptions) -> Result<Decoded> {
         runs.push((part.mesh.triangles.len(), surface));
         mesh.append(part.mesh);
     }
-    if walk.surfaces.too_many {
-        walk.notes.add(
-            "materials beyond the first 1024 of different look are shown as the last of those",
-        );
+    if let Some(message) = walk.surfaces.excess() {
+        walk.notes.add(message);
     }
     let surfaces = match look == Look::Whole && walk.made {
         true => walk.surfaces.of_faces(&mut mesh, &runs),

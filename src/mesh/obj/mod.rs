@@ -281,12 +281,7 @@ impl Obj {
                 "images of materials are not shown on faces without texture coordinates".to_owned(),
             );
         }
-        if surfaces.too_many {
-            warnings.push(
-                "materials beyond the first 1024 of different look are shown as the last of those"
-                    .to_owned(),
-            );
-        }
+        warnings.extend(surfaces.excess().map(str::to_owned));
         let colors = colors.iter().any(Option::is_some).then(|| {
             let mut values = BARE_COLOR.repeat(before);
             for (color, count) in colors.iter().zip(&counts) {
