@@ -103,7 +103,7 @@ pub trait Lanes:
     /// As many answers.
     type Mask: Mask;
     /// As many numbers of double precision.
-    type Double: Doubles<Float = Self, Mask = Self::Mask>;
+    type Double: Doubles<Float = Self, Int = Self::Int, Mask = Self::Mask>;
 
     /// Does `call` in a function of its own that knows the instructions.
     fn call<T: Call<Self>>(call: T) -> T::Output;
@@ -351,6 +351,8 @@ pub trait Doubles:
 {
     /// As many of single precision.
     type Float;
+    /// As many integers.
+    type Int;
     /// As many answers.
     type Mask;
 
@@ -370,6 +372,8 @@ pub trait Doubles:
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
     /// In single precision.
     fn narrow(self) -> Self::Float;
+    /// The nearest integers, the even one of two as near; within ±2³¹.
+    fn to_nearest(self) -> Self::Int;
 }
 
 #[cfg(test)]

@@ -187,6 +187,7 @@ impl Mask for bool {
 
 impl Doubles for f64 {
     type Float = f32;
+    type Int = Wrapping<u32>;
     type Mask = bool;
 
     #[inline(always)]
@@ -220,5 +221,11 @@ impl Doubles for f64 {
     #[inline(always)]
     fn narrow(self) -> f32 {
         self as f32
+    }
+    #[inline(always)]
+    fn to_nearest(self) -> Wrapping<u32> {
+        // What is added and taken away rounds to whole numbers, half to even.
+        const WHOLE: f64 = 1.5 * (1_u64 << 52) as f64;
+        Wrapping(((self + WHOLE - WHOLE) as i32).cast_unsigned())
     }
 }

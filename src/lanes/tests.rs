@@ -170,6 +170,8 @@ impl Task for Everything<'_> {
                 wide_a.min(wide_b).narrow(),
                 wide_a.max(wide_b).narrow(),
                 number(wide_a.lt(wide_b)),
+                (wide_a * F::Double::splat(3e8)).to_nearest().from_bits(),
+                (wide_a + wide_a).to_nearest().to_float(),
                 F::Double::select(wide_a.lt(wide_b), wide_a, F::Double::splat(0.1)).narrow(),
                 exp(a * F::splat(90.0)),
                 ln(a.abs()),

@@ -5,13 +5,15 @@
 
 use std::borrow::Cow;
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use glam::{DMat3, DVec3, Vec2, Vec3};
-use rayon::prelude::*;
 
 use super::projection::Projection;
+use super::runs::Run;
 use crate::accel::{Standing, Tracer};
 use crate::error::{Error, Problem, Result};
+use crate::lanes::Kernel;
 use crate::math::Transform;
 use crate::mesh::Mesh;
 use crate::shape::{Bounds, Geometry, Untessellated};
@@ -24,7 +26,8 @@ pub(super) struct Facets<'s> {
     pub(super) positions: Cow<'s, [Vec3]>,
     pub(super) triangles: Cow<'s, [[u32; 3]]>,
     pub(super) kind: FacetsOf<'s>,
-    /// Around all positions that are numbers.
+    pub(super) runs: Vec<Run>,
+    /// Around all of them.
     pub(super) bounds: Bounds,
 }
 
@@ -45,7 +48,7 @@ pub(super) enum FacetsOf<'s> {
 }
 
 /// A shape where it stands.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Placed {
     pub(super) shape: u32,
     pub(super) instance: u32,
@@ -76,9 +79,10 @@ type Fallible<T> = std::result::Result<T, Untessellated>;
 /// The triangles of a scene at one time.
 #[derive(Debug)]
 pub struct Drawn<'s> {
-    facets: Vec<Facets<'s>>,
+    facets: Arc<Vec<Facets<'s>>>,
     placed: Vec<Placed>,
     warnings: Vec<Problem>,
+    kernel: Kernel,
 }
 
 /// How long edges are of what is not seen, as a part of its radius.
@@ -97,6 +101,7 @@ impl<'s> Drawn<'s> {
         time: f32,
         wanted: impl Fn(u32) -> bool,
     ) -> Result<Self> {
+        let kernel = tracer.kernel();
         let mut facets: Vec<Facets<'s>> = Vec::new();
         let mut known: HashMap<u32, usize> = HashMap::new();
         let mut missing: Vec<(u32, Untessellated)> = Vec::new();
@@ -126,7 +131,7 @@ impl<'s> Drawn<'s> {
                 Some(number) => *number,
                 None => {
                     let edge = longest.get(&shape).copied();
-                    match Facets::of(tracer.shape(shape), edge, projection, time) {
+                    match Facets::of(tracer.shape(shape), edge, projection, time, kernel) {
                         Ok(of_shape) => facets.push(of_shape),
                         Err(why) => {
                             missing.push((shape, why));
@@ -153,15 +158,32 @@ impl<'s> Drawn<'s> {
         }
         let warnings = missing.iter().map(|(shape, why)| unseen(*shape, *why));
         Ok(Self {
-            facets,
+            facets: Arc::new(facets),
             placed,
             warnings: warnings.collect(),
+            kernel,
         })
+    }
+
+    /// The same but for some shapes. Triangles keep their numbers.
+    pub fn without(&self, hidden: impl Fn(u32) -> bool) -> Self {
+        let placed = self.placed.iter().filter(|placed| !hidden(placed.shape));
+        Self {
+            facets: Arc::clone(&self.facets),
+            placed: placed.cloned().collect(),
+            warnings: Vec::new(),
+            kernel: self.kernel,
+        }
     }
 
     /// What cannot be drawn.
     pub fn warnings(&self) -> &[Problem] {
         &self.warnings
+    }
+
+    /// The instructions that they are drawn with.
+    pub(super) fn kernel(&self) -> Kernel {
+        self.kernel
     }
 
     pub(super) fn placed(&self) -> &[Placed] {
@@ -213,18 +235,6 @@ fn bounds(geometry: &Geometry) -> Bounds {
     })
 }
 
-/// A box around those of the positions that are numbers.
-fn around(positions: &[Vec3]) -> Bounds {
-    // What is no number is not the lesser, and so is passed over on this side.
-    let with = |bounds: Bounds, position: &Vec3| Bounds {
-        min: position.min(bounds.min),
-        max: position.max(bounds.max),
-    };
-    let parts = positions.par_chunks(1 << 14);
-    let parts = parts.map(|part| part.iter().fold(Bounds::EMPTY, with));
-    parts.reduce(|| Bounds::EMPTY, Bounds::union)
-}
-
 /// How long edges of its triangles may be, in its own space.
 fn edge(geometry: &Geometry, to_world: Option<&Transform>, projection: &Projection) -> f32 {
     let own = bounds(geometry);
@@ -272,6 +282,7 @@ impl<'s> Facets<'s> {
         longest: Option<f32>,
         projection: &Projection,
         time: f32,
+        kernel: Kernel,
     ) -> Fallible<Self> {
         let (positions, triangles, kind) = match geometry {
             Geometry::Mesh(mesh) => {
@@ -325,9 +336,12 @@ impl<'s> Facets<'s> {
                 )
             }
         };
+        let runs = Run::all(kernel, &positions, &triangles);
+        let bounds = runs.iter().map(|run| run.bounds);
         Ok(Self {
             geometry,
-            bounds: around(&positions),
+            bounds: bounds.fold(Bounds::EMPTY, Bounds::union),
+            runs,
             positions,
             triangles,
             kind,

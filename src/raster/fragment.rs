@@ -151,8 +151,7 @@ impl Fragment {
 
 /// Where the corners of a shape's triangle are in the picture.
 fn places(projection: &Projection, placed: &Placed, corners: &[DVec3; 3]) -> [Place; 3] {
-    let (linear, translation) = placed.matrix();
-    let (matrix, offset) = projection.along_ways(linear, translation);
+    let (matrix, offset) = projection.along_ways(placed.to_world.as_ref());
     corners.map(|corner| projection.placed(matrix * corner + offset))
 }
 

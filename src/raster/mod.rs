@@ -1,17 +1,21 @@
 //! A z-buffer beside the rays: the same scene, seen by projecting its triangles. It is a picture within a moment where a tree
 //! is not worth building, an oracle for what rays see, and the textbook's pipeline with its faults to show.
 //!
-//! The steps: `projection` takes places in the picture from the sensor's own rays; `drawn` makes triangles of all shapes;
-//! `clip`, `setup` and `depth` bring each to samples of the picture, which `visibility` does for all of them in parallel;
-//! `fragment` says what is seen at a sample, `shade` what it looks like, with the help of `shadow`; `agreement` holds
-//! fragments against rays.
+//! The steps: `projection` takes places in the picture from the sensor's own rays; `drawn` makes triangles of all shapes, by
+//! `runs`; `corners`, `sift`, `clip`, `setup` and `depth` bring them to samples of the picture, which `visibility` does for all
+//! of them in parallel; `fragment` says what is seen at a sample, `shade` what it looks like, with the help of `shadow`;
+//! `agreement` holds fragments against rays.
 
 mod projection;
 
 mod clip;
+mod corners;
 mod depth;
 mod pattern;
 mod setup;
+mod sift;
+
+mod runs;
 
 mod drawn;
 mod fragment;

@@ -9,6 +9,7 @@
 use glam::{DMat3, DVec2, DVec3, Vec2, Vec3};
 
 use crate::error::{Error, Result};
+use crate::math::Transform;
 use crate::sensor::{Film, Sensor, Window};
 
 /// From the world to a picture in pixels, from its upper left corner on.
@@ -20,6 +21,8 @@ pub struct Projection {
     ways: DMat3,
     /// Its inverse.
     inverse: DMat3,
+    /// The same of world space: see [`Projection::along_ways`].
+    of_world: (DMat3, DVec3),
     /// Whether they come from one point.
     is_perspective: bool,
     /// What `a` is where the picture begins.
@@ -154,6 +157,7 @@ impl Projection {
             origin,
             ways,
             inverse,
+            of_world: (inverse, inverse * -origin),
             is_perspective,
             near,
             far,
@@ -188,9 +192,13 @@ impl Projection {
         Place { x, y, a: z, w }
     }
 
-    /// The matrix and the vector that [`Projection::placed`] wants of a point of a space with that matrix to the world.
-    pub(super) fn along_ways(&self, linear: DMat3, translation: DVec3) -> (DMat3, DVec3) {
-        let matrix = self.inverse * linear;
+    /// The matrix and the vector that [`Projection::placed`] wants of a point of a space that stands so in the world.
+    pub(super) fn along_ways(&self, to_world: Option<&Transform>) -> (DMat3, DVec3) {
+        let Some(to_world) = to_world else {
+            return self.of_world;
+        };
+        let matrix = self.inverse * to_world.linear().as_dmat3();
+        let translation = to_world.translation().as_dvec3();
         (matrix, self.inverse * (translation - self.origin))
     }
 

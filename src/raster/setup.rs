@@ -5,6 +5,7 @@
 //! What an edge leaves of a long row of samples is computed by one division.
 
 use super::projection::Place;
+use crate::lanes::Doubles as _;
 use crate::sensor::Window;
 
 /// Fixed-point coordinates are below 2 to that power, so that edge functions fit into 64 bits.
@@ -26,13 +27,29 @@ pub(super) struct Grid {
 }
 
 /// A corner.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Corner {
     /// On the grid; `UNPLACED` where the triangle has to be cut first, and then which limits it is beyond.
     pub(super) x: i32,
     pub(super) y: i32,
-    /// What is linear over the picture.
-    pub(super) linear: f64,
+}
+
+/// Where the first pixels of a corner's row and column are whose samples are not before it, and, less than nothing, where the
+/// last are whose samples are not after it; within the picture, in steps of the grid. The least of those of a triangle's
+/// corners tell in which pixels it may have samples.
+pub(super) type Reach = [i32; 4];
+
+/// How pixels along an axis are found by bits of coordinates.
+pub(super) struct Steps {
+    /// Where the first pixel begins on the grid of the whole picture.
+    pub(super) origin: i32,
+    /// The bits that are no fraction of a pixel.
+    pub(super) whole: i32,
+    /// What is added to a coordinate for the first pixel, and for the last.
+    pub(super) to_first: i32,
+    pub(super) to_last: i32,
+    /// The picture's last pixel.
+    pub(super) last: i32,
 }
 
 impl Corner {
@@ -43,7 +60,6 @@ impl Corner {
         Self {
             x: Self::UNPLACED,
             y: beyond,
-            linear: 0.0,
         }
     }
 
@@ -90,18 +106,52 @@ impl Grid {
 
     /// A place on the grid. It must lie within the band.
     #[inline]
-    pub(super) fn corner(&self, place: &Place, linear: f64) -> Corner {
-        // What is added and taken away rounds to whole numbers, half to even.
-        const WHOLE: f64 = 1.5 * (1_u64 << 52) as f64;
-        let scale = f64::from(1_u32 << self.bits) / place.w;
-        let [x, y] = [place.x * scale, place.y * scale].map(|v| (v + WHOLE - WHOLE) as i32);
-        let [left, top] = self.first.map(|first| (first << self.bits) as i32);
+    pub(super) fn corner(&self, place: &Place) -> Corner {
+        let scale = self.scale() / place.w;
+        let [x, y] = [place.x * scale, place.y * scale].map(|v| v.to_nearest().0.cast_signed());
+        let [left, top] = self.origin();
         Corner {
             x: x - left,
             y: y - top,
-            linear,
         }
     }
+
+    /// Steps of the grid to a pixel.
+    pub(super) fn scale(&self) -> f64 {
+        f64::from(1_u32 << self.bits)
+    }
+
+    /// The upper left corner of the first pixel on the picture's grid.
+    pub(super) fn origin(&self) -> [i32; 2] {
+        self.first.map(|first| (first << self.bits).cast_signed())
+    }
+
+    /// How pixels along an axis are found, as [`Grid::pixels`] has them.
+    pub(super) fn steps(&self, axis: usize) -> Steps {
+        let pixel = 1_i32 << self.bits;
+        let [low, high] = self.inset[axis].map(|inset| inset as i32);
+        Steps {
+            origin: self.origin()[axis],
+            whole: -pixel,
+            to_first: pixel - 1 - high,
+            to_last: -low,
+            last: (self.size[axis].cast_signed() - 1) << self.bits,
+        }
+    }
+
+    /// A corner's reach.
+    #[cfg(test)]
+    pub(super) fn reach(&self, corner: &Corner) -> Reach {
+        let axis = |axis: usize, coordinate: i32| {
+            let (first, last) = self.pixels(axis, coordinate, coordinate);
+            [first, -last].map(|pixel| (pixel << self.bits) as i32)
+        };
+        let ([left, right], [top, bottom]) = (axis(0, corner.x), axis(1, corner.y));
+        [left, top, right, bottom]
+    }
+
+    /// The reach of a corner that lies anywhere.
+    pub(super) const EVERYWHERE: Reach = [i32::MIN / 4; 4];
 
     /// The pixels along an axis that a range of coordinates may have samples in.
     #[inline]
@@ -174,27 +224,50 @@ impl Facet {
         self.rows.0 < i64::from(rows.end) && self.rows.1 >= i64::from(rows.start)
     }
 
-    /// Gives the samples that it covers in some rows of the picture: index of the pixel and of the sample, and what is linear
-    /// over the picture there.
+    /// Gives the samples that it covers in some rows of the picture: index of the pixel and of the sample, and there what is
+    /// linear over the picture, of which `linear` knows what it is at the corners as they were given.
     #[inline]
     pub(super) fn cover(
         &self,
         grid: &Grid,
         rows: std::ops::Range<u32>,
+        linear: impl Fn() -> [f64; 3],
         mut take: impl FnMut(usize, usize, f64),
     ) {
         let [a, b, c] = &self.corners;
+        let mut known = None;
         let top = self.rows.0.max(i64::from(rows.start));
         let bottom = self.rows.1.min(i64::from(rows.end) - 1);
         let begin = [self.columns.0 << grid.bits, top << grid.bits];
         let edges = [(b, c), (c, a), (a, b)].map(|(from, to)| Edge::new(from, to, begin));
-        let scale = 1.0 / self.area as f64;
         let step = 1_i64 << grid.bits;
         let last = self.columns.1 - self.columns.0;
-        let along = |values: [i64; 3]| {
+        let mut along = |values: [i64; 3]| {
+            // Most triangles of a fine mesh cover nothing, and need not know.
+            let know = || (1.0 / self.area as f64, linear());
+            let (scale, [first, second, third]) = *known.get_or_insert_with(know);
             let [u, v, w] = values.map(|value| value as f64 * scale);
-            u * a.linear + v * b.linear + w * c.linear
+            match self.is_turned {
+                false => u * first + v * second + w * third,
+                true => u * first + v * third + w * second,
+            }
         };
+        // All within if none is negative.
+        let is_within = |values: &[i64; 3]| {
+            let [u, v, w] = [0, 1, 2].map(|i| values[i] - edges[i].least);
+            u | v | w >= 0
+        };
+        if last == 0 && top == bottom {
+            // As most that are left of a fine mesh.
+            let pixel = (top * i64::from(grid.size[0]) + self.columns.0) as usize;
+            for (sample, inset) in grid.samples.iter().enumerate() {
+                let values = edges.each_ref().map(|edge| edge.moved(*inset));
+                if is_within(&values) {
+                    take(pixel, sample, along(values));
+                }
+            }
+            return;
+        }
         for (sample, inset) in grid.samples.iter().enumerate() {
             let mut values = edges.each_ref().map(|edge| edge.moved(*inset));
             let mut first_pixel = (top * i64::from(grid.size[0]) + self.columns.0) as usize;
@@ -205,9 +278,8 @@ impl Facet {
                 };
                 let mut here = [0, 1, 2].map(|i| values[i] - edges[i].dy * step * columns.start);
                 for column in columns {
-                    // All within if none is negative. A span has been found to be so.
-                    let within = [0, 1, 2].map(|i| here[i] - edges[i].least);
-                    if within[0] | within[1] | within[2] >= 0 {
+                    // A span has been found to be so.
+                    if is_within(&here) {
                         take(first_pixel + column as usize, sample, along(here));
                     }
                     for (value, edge) in here.iter_mut().zip(&edges) {
@@ -296,7 +368,7 @@ mod tests {
             a: 1.0,
             w: 1.0,
         };
-        grid.corner(&place, x + 2.0 * y)
+        grid.corner(&place)
     }
 
     /// How often each sample is covered by the triangles.
@@ -306,9 +378,14 @@ mod tests {
         for triangle in triangles {
             let corners = triangle.map(|[x, y]| corner(grid, x, y));
             if let Some(facet) = grid.triangle(corners) {
-                facet.cover(grid, 0..48, |pixel, sample, _| {
-                    counts[pixel * samples + sample] += 1;
-                });
+                facet.cover(
+                    grid,
+                    0..48,
+                    || [0.0; 3],
+                    |pixel, sample, _| {
+                        counts[pixel * samples + sample] += 1;
+                    },
+                );
             }
         }
         counts
@@ -360,17 +437,23 @@ mod tests {
     #[test]
     fn what_is_linear_over_the_picture_is_linear_over_the_triangle() {
         let grid = grid(Pattern::CENTRE);
-        let corners = [[3.2, 4.7], [60.1, 9.9], [20.0, 45.5]].map(|[x, y]| corner(&grid, x, y));
-        let mut covered = 0;
-        grid.triangle(corners)
-            .unwrap()
-            .cover(&grid, 0..48, |pixel, _, linear| {
-                let (x, y) = ((pixel % 64) as f64 + 0.5, (pixel / 64) as f64 + 0.5);
-                assert!((linear - (x + 2.0 * y)).abs() < 1e-3, "{linear}");
-                covered += 1;
-            });
-        let area = 0.5 * ((56.9_f64) * 40.8 - 5.2 * 16.8);
-        assert!((f64::from(covered) - area).abs() < 40.0, "{covered} {area}");
+        let [a, b, c] = [[3.2, 4.7], [60.1, 9.9], [20.0, 45.5]];
+        for triangle in [[a, b, c], [c, b, a]] {
+            let corners = triangle.map(|[x, y]| corner(&grid, x, y));
+            let mut covered = 0;
+            grid.triangle(corners).unwrap().cover(
+                &grid,
+                0..48,
+                || triangle.map(|[x, y]| x + 2.0 * y),
+                |pixel, _, linear| {
+                    let (x, y) = ((pixel % 64) as f64 + 0.5, (pixel / 64) as f64 + 0.5);
+                    assert!((linear - (x + 2.0 * y)).abs() < 1e-3, "{linear}");
+                    covered += 1;
+                },
+            );
+            let area = 0.5 * ((56.9_f64) * 40.8 - 5.2 * 16.8);
+            assert!((f64::from(covered) - area).abs() < 40.0, "{covered} {area}");
+        }
     }
 
     #[test]

@@ -1,21 +1,27 @@
-//! Which triangle is seen at each sample: all triangles of a scene into a z-buffer, by all threads at once. Corners are
-//! projected first; then each thread takes runs of triangles, and those that are high are left for a second round in which
-//! each thread has rows of its own. A sample holds one number whose maximum is taken (see `depth`), so that no schedule can
-//! change what is seen; nothing is shaded before all is drawn (Burns and Hunt, *The visibility buffer*, 2013).
+//! Which triangle is seen at each sample: all triangles of a scene into a z-buffer, by all threads at once. Each takes runs of
+//! triangles, projects their corners, sifts out those that lie between samples and draws the others, but those that are high
+//! are left for a second round in which each thread has rows of its own. A sample holds one number whose maximum is taken (see
+//! `depth`), so that no schedule can change what is seen; nothing is shaded before all is drawn (Burns and Hunt, *The
+//! visibility buffer*, 2013).
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use glam::{DMat3, DVec3, Vec3};
+use glam::Vec3;
 use rayon::prelude::*;
 
 use super::clip::{Limits, clip};
+use super::corners::{Corners, PlaceCorners, Placing};
 use super::depth::{self, DepthCode, DepthFormat};
 use super::drawn::{Drawn, Placed};
 use super::pattern::Pattern;
 use super::projection::{Place, Projection};
+use super::runs::{self, Run};
 use super::setup::{Corner, Facet, Grid};
+use super::sift::Sift;
 use crate::error::{Error, Result};
+use crate::lanes::Kernel;
 use crate::sensor::Window;
+use crate::shape::Bounds;
 
 /// Which sides of surfaces are left out.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -53,8 +59,6 @@ pub struct Visibility {
     keys: Vec<AtomicU64>,
 }
 
-/// Corners and triangles that one task takes.
-const GRAIN: usize = 1 << 12;
 /// Rows of pixels that a triangle may have before it is left for the second round, and that a task has there.
 const ROWS: u32 = 32;
 
@@ -100,7 +104,8 @@ impl Visibility {
             ))
             .help("take fewer samples, or render it in crops")
         })?;
-        keys.resize_with(count, AtomicU64::default);
+        // Memory is given when it is written to first: by all threads.
+        keys.par_extend((0..count).into_par_iter().map(|_| AtomicU64::default()));
         let grid = Grid::new(picture, &window, &pattern);
         let painter = Painter {
             keys: &keys,
@@ -118,8 +123,8 @@ impl Visibility {
         let bands = (0..size[1].div_ceil(ROWS)).into_par_iter();
         bands.for_each(|band| {
             let rows = band * ROWS..size[1].min((band + 1) * ROWS);
-            for (facet, number) in high.iter().filter(|(facet, _)| facet.reaches(&rows)) {
-                painter.fill(facet, *number, rows.clone());
+            for high in high.iter().filter(|high| high.facet.reaches(&rows)) {
+                painter.fill(&high.facet, high.number, rows.clone(), || high.linear);
             }
         });
         Ok(Self {
@@ -161,20 +166,99 @@ struct Painter<'a> {
     window: Window,
 }
 
+/// A triangle that is left for the second round.
+struct High {
+    facet: Facet,
+    number: u32,
+    /// What is linear over the picture, at its corners.
+    linear: [f64; 3],
+}
+
+/// What a thread knows of the run of triangles that it draws, with room for another.
+#[derive(Default)]
+struct Stage {
+    corners: Corners,
+    /// The triangles that may have samples, by their places in the run.
+    found: Vec<u32>,
+    /// The first corner of a run whose corners stand together; `None` where each triangle has three of its own.
+    first: Option<u32>,
+    /// Then their positions, and the triangles.
+    positions: Vec<Vec3>,
+    triangles: Vec<[u32; 3]>,
+}
+
+impl Stage {
+    /// Places the corners of a run and finds the triangles that may have samples; the answer is how many.
+    fn place(
+        &mut self,
+        kernel: Kernel,
+        placing: &Placing<'_>,
+        positions: &[Vec3],
+        (run, triangles): (&Run, &[[u32; 3]]),
+    ) -> usize {
+        self.first = run.corners.as_ref().map(|corners| *corners.start());
+        let (positions, triangles) = match &run.corners {
+            Some(corners) => {
+                let corners = *corners.start() as usize..=*corners.end() as usize;
+                (&positions[corners], triangles)
+            }
+            None => {
+                let corners = triangles.as_flattened().iter();
+                self.positions.clear();
+                self.positions
+                    .extend(corners.map(|i| positions[*i as usize]));
+                let own = self.triangles.len() as u32..triangles.len() as u32;
+                self.triangles
+                    .extend(own.map(|i| [3 * i, 3 * i + 1, 3 * i + 2]));
+                (&self.positions[..], &self.triangles[..triangles.len()])
+            }
+        };
+        kernel.run(PlaceCorners {
+            placing,
+            positions,
+            to: &mut self.corners,
+        });
+        if self.found.len() < triangles.len() {
+            self.found.resize(triangles.len(), 0);
+        }
+        kernel.run(Sift {
+            reaches: &self.corners.reaches,
+            triangles,
+            first: self.first.unwrap_or(0),
+            found: &mut self.found,
+        })
+    }
+
+    /// The corners of the run's triangle at a place.
+    #[inline]
+    fn corners(&self, triangles: &[[u32; 3]], place: u32) -> [Corner; 3] {
+        let triangle = match self.first {
+            Some(first) => triangles[place as usize].map(|i| i - first),
+            None => self.triangles[place as usize],
+        };
+        triangle.map(|i| self.corners.corners[i as usize])
+    }
+}
+
 impl Painter<'_> {
     /// Draws a shape; the answer is the triangles that are left, which are high.
-    fn paint(&self, drawn: &Drawn<'_>, placed: &Placed, cull: Cull) -> Vec<(Facet, u32)> {
+    fn paint(&self, drawn: &Drawn<'_>, placed: &Placed, cull: Cull) -> Vec<High> {
         let facets = drawn.facets(placed);
-        let (linear, translation) = placed.matrix();
-        let (matrix, offset) = self.projection.along_ways(linear, translation);
-        let around = facets.bounds.corners();
-        let around = around.map(|corner| self.place(&matrix, offset, corner));
-        if self.projection.misses(&around, &self.window) {
+        let (matrix, offset) = self.projection.along_ways(placed.to_world.as_ref());
+        let placing = Placing {
+            projection: self.projection,
+            limits: &self.limits,
+            grid: &self.grid,
+            matrix,
+            offset,
+        };
+        let is_missed = |bounds: &Bounds| {
+            let around = bounds.corners().map(|corner| placing.place(corner));
+            self.projection.misses(&around, &self.window)
+        };
+        if is_missed(&facets.bounds) {
             return Vec::new();
         }
-        let corners: Vec<Corner> = (facets.positions.par_iter().with_min_len(GRAIN))
-            .map(|position| self.corner(&matrix, offset, *position))
-            .collect();
         // A triangle turns as its corners do: seen with y down a front is turned where the matrix does not mirror.
         let front = matrix.determinant() > 0.0;
         let keep = |is_turned: bool| match cull {
@@ -182,77 +266,88 @@ impl Painter<'_> {
             Cull::Back => is_turned == front,
             Cull::Front => is_turned != front,
         };
-        let runs = facets.triangles.par_chunks(GRAIN).enumerate();
-        let high = runs.map(|(run, triangles)| {
-            let mut high = Vec::new();
-            let first = placed.first + (run * GRAIN) as u32;
-            for (number, triangle) in (first..).zip(triangles) {
-                let three = triangle.map(|i| corners[i as usize]);
-                let [a, b, c] = three.each_ref().map(Corner::beyond);
-                if a & b & c != 0 {
-                    continue;
+        let runs = facets.triangles.par_chunks(runs::LENGTH).zip(&facets.runs);
+        let high = runs
+            .enumerate()
+            .map_init(Stage::default, |stage, (i, (triangles, run))| {
+                let mut high = Vec::new();
+                if is_missed(&run.bounds) {
+                    return high;
                 }
-                if a | b | c != 0 {
-                    let places =
-                        triangle.map(|i| self.place(&matrix, offset, facets.positions[i as usize]));
-                    self.cut(places, |facet| {
-                        if keep(facet.is_turned) {
-                            self.fill_or_leave(facet, number, &mut high);
-                        }
-                    });
-                } else if let Some(facet) = self.grid.triangle(three)
-                    && keep(facet.is_turned)
-                {
-                    self.fill_or_leave(facet, number, &mut high);
+                let run = (run, triangles);
+                let count = stage.place(drawn.kernel(), &placing, &facets.positions, run);
+                let first = placed.first + (i * runs::LENGTH) as u32;
+                for i in &stage.found[..count] {
+                    let (triangle, number) = (triangles[*i as usize], first + i);
+                    let three = stage.corners(triangles, *i);
+                    let places = || triangle.map(|i| placing.place(facets.positions[i as usize]));
+                    let [a, b, c] = three.each_ref().map(Corner::beyond);
+                    if a & b & c != 0 {
+                        continue;
+                    }
+                    if a | b | c != 0 {
+                        self.cut(places(), |facet, linear| {
+                            if keep(facet.is_turned) {
+                                self.fill_or_leave(facet, number, || linear, &mut high);
+                            }
+                        });
+                    } else if let Some(facet) = self.grid.triangle(three)
+                        && keep(facet.is_turned)
+                    {
+                        let linear = || places().map(|place| self.code.linear(place.a));
+                        self.fill_or_leave(facet, number, linear, &mut high);
+                    }
                 }
-            }
-            high
-        });
+                high
+            });
         high.flatten_iter().collect()
     }
 
-    #[inline]
-    fn place(&self, matrix: &DMat3, offset: DVec3, position: Vec3) -> Place {
-        self.projection
-            .placed(*matrix * position.as_dvec3() + offset)
-    }
-
-    #[inline]
-    fn corner(&self, matrix: &DMat3, offset: DVec3, position: Vec3) -> Corner {
-        let place = self.place(matrix, offset, position);
-        match self.limits.contains(&place) {
-            true => self.grid.corner(&place, self.code.linear(place.a)),
-            false => Corner::outside(self.limits.beyond(&place)),
-        }
-    }
-
     /// Gives what the limits leave of a triangle.
-    fn cut(&self, places: [Place; 3], mut take: impl FnMut(Facet)) {
+    fn cut(&self, places: [Place; 3], mut take: impl FnMut(Facet, [f64; 3])) {
         let polygon = clip(places, &self.limits);
-        let corner = |place: &Place| self.grid.corner(place, self.code.linear(place.a));
         let Some((first, rest)) = polygon.corners().split_first() else {
             return;
         };
         for pair in rest.windows(2) {
-            let corners = [corner(first), corner(&pair[0]), corner(&pair[1])];
-            if let Some(facet) = self.grid.triangle(corners) {
-                take(facet);
+            let places = [first, &pair[0], &pair[1]];
+            if let Some(facet) = self
+                .grid
+                .triangle(places.map(|place| self.grid.corner(place)))
+            {
+                take(facet, places.map(|place| self.code.linear(place.a)));
             }
         }
     }
 
     #[inline]
-    fn fill_or_leave(&self, facet: Facet, number: u32, high: &mut Vec<(Facet, u32)>) {
+    fn fill_or_leave(
+        &self,
+        facet: Facet,
+        number: u32,
+        linear: impl Fn() -> [f64; 3],
+        high: &mut Vec<High>,
+    ) {
         if facet.height() > i64::from(ROWS) {
-            high.push((facet, number));
+            high.push(High {
+                facet,
+                number,
+                linear: linear(),
+            });
         } else {
-            self.fill(&facet, number, 0..self.grid.rows());
+            self.fill(&facet, number, 0..self.grid.rows(), linear);
         }
     }
 
     #[inline]
-    fn fill(&self, facet: &Facet, number: u32, rows: std::ops::Range<u32>) {
-        facet.cover(&self.grid, rows, |pixel, sample, linear| {
+    fn fill(
+        &self,
+        facet: &Facet,
+        number: u32,
+        rows: std::ops::Range<u32>,
+        linear: impl Fn() -> [f64; 3],
+    ) {
+        facet.cover(&self.grid, rows, linear, |pixel, sample, linear| {
             let key = depth::key(self.code.code(linear), number);
             let kept = &self.keys[pixel * self.samples + sample];
             if kept.load(Ordering::Relaxed) < key {

@@ -91,9 +91,7 @@ pub(super) fn draw<C: ColorModel>(
         cull: raster.cull,
     };
     let seen = Visibility::draw(&drawn, &projection, &canvas)?;
-    let casters = Drawn::new(tracer, &projection, time, |shape| {
-        !is_clear(shape) && !scene.shines(shape)
-    })?;
+    let casters = drawn.without(|shape| scene.shines(shape));
     let shader = |pass| {
         let wavelengths = scene.color().wavelengths_of(pass, || 0.5);
         Shader::new(scene, raster.shade, wavelengths, time).with_maps(&casters)

@@ -334,6 +334,7 @@ unsafe fn halves(mask: M8) -> (__m256d, __m256d) {
 
 impl Doubles for F64x8 {
     type Float = F32x8;
+    type Int = U32x8;
     type Mask = M8;
 
     #[inline(always)]
@@ -407,6 +408,17 @@ impl Doubles for F64x8 {
         unsafe {
             let low = _mm256_castps128_ps256(_mm256_cvtpd_ps(self.0));
             F32x8(_mm256_insertf128_ps::<1>(low, _mm256_cvtpd_ps(self.1)))
+        }
+    }
+    #[inline(always)]
+    fn to_nearest(self) -> U32x8 {
+        // SAFETY: see the module.
+        unsafe {
+            let low = _mm256_castsi128_si256(_mm256_cvtpd_epi32(self.0));
+            U32x8(_mm256_inserti128_si256::<1>(
+                low,
+                _mm256_cvtpd_epi32(self.1),
+            ))
         }
     }
 }

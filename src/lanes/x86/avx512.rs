@@ -341,6 +341,7 @@ impl Ints for U32x16 {
 
 impl Doubles for F64x16 {
     type Float = F32x16;
+    type Int = U32x16;
     type Mask = M16;
 
     #[inline(always)]
@@ -403,6 +404,14 @@ impl Doubles for F64x16 {
         unsafe {
             let low = _mm512_castps256_ps512(_mm512_cvtpd_ps(self.0));
             F32x16(_mm512_insertf32x8::<1>(low, _mm512_cvtpd_ps(self.1)))
+        }
+    }
+    #[inline(always)]
+    fn to_nearest(self) -> U32x16 {
+        // SAFETY: see the module.
+        unsafe {
+            let low = _mm512_castsi256_si512(_mm512_cvtpd_epi32(self.0));
+            U32x16(_mm512_inserti64x4::<1>(low, _mm512_cvtpd_epi32(self.1)))
         }
     }
 }

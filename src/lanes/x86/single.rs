@@ -191,6 +191,7 @@ impl Ints for U32x1 {
 
 impl Doubles for F64x1 {
     type Float = F32x1;
+    type Int = U32x1;
     type Mask = bool;
 
     methods!(Doubles of f64: new sqrt(), new abs(), new min(other), new max(other), is lt(other));
@@ -206,5 +207,9 @@ impl Doubles for F64x1 {
     #[inline(always)]
     fn narrow(self) -> F32x1 {
         F32x1(self.0.narrow())
+    }
+    #[inline(always)]
+    fn to_nearest(self) -> U32x1 {
+        U32x1(self.0.to_nearest())
     }
 }

@@ -1,0 +1,239 @@
+//! Corners in the picture, over lanes: those of a run of triangles, which are few enough to stay in a processor's cache until
+//! the triangles have been looked at. What is linear over the picture is computed again for triangles that cover a sample,
+//! which are few where it matters.
+
+use glam::{DMat3, DVec3, Vec3};
+
+use super::clip::Limits;
+use super::projection::{Place, Projection};
+use super::setup::{Corner, Grid, Reach};
+use crate::lanes::{Doubles, Ints, Lanes, Mask as _, Task};
+
+/// From a shape's space to the picture's grid.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Placing<'a> {
+    pub(super) projection: &'a Projection,
+    pub(super) limits: &'a Limits,
+    pub(super) grid: &'a Grid,
+    /// To coordinates along the projection's ways.
+    pub(super) matrix: DMat3,
+    pub(super) offset: DVec3,
+}
+
+impl Placing<'_> {
+    /// Where a position is.
+    #[inline]
+    pub(super) fn place(&self, position: Vec3) -> Place {
+        let along = self.matrix * position.as_dvec3() + self.offset;
+        self.projection.placed(along)
+    }
+}
+
+/// Corners of a run, with room for those of another.
+#[derive(Debug, Default)]
+pub(super) struct Corners {
+    pub(super) corners: Vec<Corner>,
+    /// Of each.
+    pub(super) reaches: Vec<Reach>,
+}
+
+/// Places positions on the grid.
+pub(super) struct PlaceCorners<'a> {
+    pub(super) placing: &'a Placing<'a>,
+    pub(super) positions: &'a [Vec3],
+    pub(super) to: &'a mut Corners,
+}
+
+impl Task for PlaceCorners<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<F: Lanes>(self) {
+        let Placing {
+            projection,
+            limits,
+            grid,
+            matrix,
+            offset,
+        } = *self.placing;
+        let wide = <F::Double as Doubles>::splat;
+        let axes = [Axis::<F>::new(grid, 0), Axis::<F>::new(grid, 1)];
+        // The least and the greatest within the range: doubles answer whether they are less, and no more.
+        let (before, after) = (wide(limits.near.next_down()), wide(limits.far.next_up()));
+        let endless = wide(f64::INFINITY);
+        let Corners { corners, reaches } = self.to;
+        if corners.len() < self.positions.len() {
+            corners.resize(self.positions.len(), Corner::default());
+            reaches.resize(self.positions.len(), Reach::default());
+        }
+        let runs = self.positions.chunks(F::WIDTH);
+        let to = corners.chunks_mut(F::WIDTH);
+        for (positions, (corners, reaches)) in runs.zip(to.zip(reaches.chunks_mut(F::WIDTH))) {
+            let mut rows = [F::ROW; 3];
+            for (lane, position) in positions.iter().enumerate() {
+                rows[0][lane] = position.x;
+                rows[1][lane] = position.y;
+                rows[2][lane] = position.z;
+            }
+            let p = [
+                F::load(&rows[0]).widen(),
+                F::load(&rows[1]).widen(),
+                F::load(&rows[2]).widen(),
+            ];
+            let x = along::<F>(row(&matrix, 0), offset.x, p);
+            let y = along::<F>(row(&matrix, 1), offset.y, p);
+            let a = along::<F>(row(&matrix, 2), offset.z, p);
+            let w = match projection.is_perspective() {
+                true => a,
+                false => wide(1.0),
+            };
+            let reach = wide(limits.band) * w;
+            // Beyond no limit, as `Limits::beyond` has it.
+            let inside = before.lt(a)
+                & a.lt(after)
+                & !reach.lt(x.abs())
+                & x.abs().lt(endless)
+                & !reach.lt(y.abs())
+                & y.abs().lt(endless);
+            let scale = wide(grid.scale()) / w;
+            let x = axes[0].along((x * scale).to_nearest());
+            let y = axes[1].along((y * scale).to_nearest());
+            for (lane, corner) in corners.iter_mut().enumerate().take(positions.len()) {
+                let [x, first_x, last_x] = [x[0][lane], x[1][lane], x[2][lane]];
+                let [y, first_y, last_y] = [y[0][lane], y[1][lane], y[2][lane]];
+                corner.x = x.cast_signed();
+                corner.y = y.cast_signed();
+                reaches[lane] = [first_x, first_y, last_x, last_y].map(u32::cast_signed);
+            }
+            for lane in (!inside).lanes().take_while(|lane| *lane < positions.len()) {
+                let place = self.placing.place(positions[lane]);
+                corners[lane] = Corner::outside(limits.beyond(&place));
+                reaches[lane] = Grid::EVERYWHERE;
+            }
+        }
+    }
+}
+
+/// What lanes need of [`Grid::reach`] along an axis.
+struct Axis<F: Lanes> {
+    origin: F::Int,
+    whole: F::Int,
+    to_first: F::Int,
+    to_last: F::Int,
+    last: F::Int,
+}
+
+impl<F: Lanes> Axis<F> {
+    #[inline(always)]
+    fn new(grid: &Grid, axis: usize) -> Self {
+        let steps = grid.steps(axis);
+        let all = |value: i32| F::Int::splat(value.cast_unsigned());
+        Self {
+            origin: all(steps.origin),
+            whole: all(steps.whole),
+            to_first: all(steps.to_first),
+            to_last: all(steps.to_last),
+            last: all(steps.last),
+        }
+    }
+
+    /// The coordinates of corners by those on the picture's grid, and the two of their reach.
+    #[inline(always)]
+    fn along(&self, coordinate: F::Int) -> [<F::Int as Ints>::Row; 3] {
+        let zero = F::Int::splat(0);
+        let own = coordinate - self.origin;
+        let first = (own + self.to_first) & self.whole;
+        let last = (own + self.to_last) & self.whole;
+        let mut rows = [F::Int::ROW; 3];
+        own.store(&mut rows[0]);
+        F::Int::select(first.lt(zero), zero, first).store(&mut rows[1]);
+        (zero - F::Int::select(self.last.lt(last), self.last, last)).store(&mut rows[2]);
+        rows
+    }
+}
+
+/// A row of a matrix.
+#[inline(always)]
+fn row(matrix: &DMat3, row: usize) -> [f64; 3] {
+    let columns = [matrix.x_axis, matrix.y_axis, matrix.z_axis];
+    [columns[0][row], columns[1][row], columns[2][row]]
+}
+
+/// The products' sum, in the order of a matrix's product with a vector.
+#[inline(always)]
+fn along<F: Lanes>(row: [f64; 3], offset: f64, [x, y, z]: [F::Double; 3]) -> F::Double {
+    let wide = <F::Double as Doubles>::splat;
+    wide(row[0]) * x + wide(row[1]) * y + wide(row[2]) * z + wide(offset)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Pattern;
+    use super::super::tests::{scene, sensor};
+    use super::*;
+    use crate::lanes::Kernel;
+    use crate::sensor::Window;
+
+    #[test]
+    fn corners_lie_where_places_do_on_every_processor() {
+        const ODD: [f32; 9] = [
+            0.0,
+            -0.3,
+            1.7,
+            -4.0,
+            30.0,
+            1e10,
+            f32::MAX,
+            f32::NEG_INFINITY,
+            f32::NAN,
+        ];
+        let window = Window {
+            x: 20,
+            y: 10,
+            width: 30,
+            height: 25,
+        };
+        let grid = Grid::new([80, 60], &window, &Pattern::CENTRE);
+        let ways = ODD.iter().flat_map(|x| ODD.map(|y| (*x, y)));
+        let positions: Vec<Vec3> = ways
+            .flat_map(|(x, y)| ODD.map(|z| Vec3::new(x, y, z)))
+            .collect();
+        for plugin in ["perspective", "orthographic"] {
+            let (_, sensor, film) = scene(&sensor(plugin, ""));
+            let projection = Projection::of_sensor(&sensor, &film, 0.0).unwrap();
+            let limits = Limits::new(&projection, grid.band());
+            let (matrix, offset) = projection.along_ways(None);
+            let placing = Placing {
+                projection: &projection,
+                limits: &limits,
+                grid: &grid,
+                matrix,
+                offset,
+            };
+            let expected = positions.iter().map(|position| {
+                let place = placing.place(*position);
+                match limits.beyond(&place) {
+                    0 => {
+                        let corner = grid.corner(&place);
+                        (corner, grid.reach(&corner))
+                    }
+                    beyond => (Corner::outside(beyond), Grid::EVERYWHERE),
+                }
+            });
+            let expected: (Vec<Corner>, Vec<Reach>) = expected.unzip();
+            let outside = expected.0.iter().filter(|corner| corner.beyond() != 0);
+            let outside = outside.count();
+            assert!(outside > 100 && positions.len() - outside > 50, "{outside}");
+            for kernel in Kernel::all() {
+                let mut corners = Corners::default();
+                kernel.run(PlaceCorners {
+                    placing: &placing,
+                    positions: &positions,
+                    to: &mut corners,
+                });
+                let found = (corners.corners, corners.reaches);
+                assert_eq!(found, expected, "{plugin} {}", kernel.name());
+            }
+        }
+    }
+}
