@@ -13,7 +13,7 @@ use super::projection::Projection;
 use super::runs::Run;
 use crate::accel::{Standing, Tracer};
 use crate::error::{Error, Problem, Result};
-use crate::lanes::Kernel;
+use crate::lanes::{self, Kernel};
 use crate::math::Transform;
 use crate::mesh::Mesh;
 use crate::shape::{Bounds, Geometry, Untessellated};
@@ -208,6 +208,26 @@ impl<'s> Drawn<'s> {
         let (linear, translation) = placed.matrix();
         let corners = self.facets(placed).corners(triangle);
         corners.map(|corner| linear * corner + translation)
+    }
+
+    /// Asks for a triangle's memory ahead: which corners it has.
+    pub fn fetch(&self, number: u32) {
+        let (placed, triangle) = self.find(number);
+        lanes::fetch(&self.facets(placed).triangles[triangle]);
+    }
+
+    /// And where those are, with their normals, once [`Drawn::fetch`] has been done for a while.
+    pub fn fetch_corners(&self, number: u32) {
+        let (placed, triangle) = self.find(number);
+        let facets = self.facets(placed);
+        for corner in facets.triangles[triangle] {
+            lanes::fetch(&facets.positions[corner as usize]);
+            if let FacetsOf::Mesh(mesh) = facets.kind
+                && let Some(normal) = mesh.normals.get(corner as usize)
+            {
+                lanes::fetch(normal);
+            }
+        }
     }
 
     /// How many triangles there are.

@@ -9,7 +9,7 @@
 
 use glam::{DMat3, DVec2, DVec3, Vec2, Vec3};
 
-use super::drawn::{Drawn, FacetsOf, Placed};
+use super::drawn::{Drawn, Facets, FacetsOf, Placed};
 use super::projection::{Line, Place, Projection};
 use crate::interaction::{Hit, Ray};
 use crate::mesh::Mesh;
@@ -30,6 +30,23 @@ pub struct Fragment {
     on_patch: Option<SurfaceSample>,
 }
 
+/// A triangle as its fragments need it, so that neighbours share what is the same for all of them.
+#[derive(Debug)]
+pub struct Face<'d, 's> {
+    projection: &'d Projection,
+    placed: &'d Placed,
+    facets: &'d Facets<'s>,
+    /// Which of the shape's.
+    triangle: usize,
+    /// In the shape's space.
+    corners: [DVec3; 3],
+    /// How far along the projection's lines the corners are.
+    depths: [f64; 3],
+    /// The planes through two corners each in homogeneous coordinates, opposite the corners.
+    sides: [DVec3; 3],
+    to_world: (DMat3, DVec3),
+}
+
 /// What is known of the surface at a fragment.
 #[derive(Clone, Copy, Debug)]
 pub struct Attributes {
@@ -43,17 +60,41 @@ pub struct Attributes {
     pub edge: f64,
 }
 
-impl Fragment {
-    /// What is seen at a place, in pixels, of the triangle with that number.
-    pub fn new(drawn: &Drawn<'_>, projection: &Projection, number: u32, at: DVec2) -> Self {
+impl<'d, 's> Face<'d, 's> {
+    /// The triangle with that number.
+    pub fn new(drawn: &'d Drawn<'s>, projection: &'d Projection, number: u32) -> Self {
         let (placed, triangle) = drawn.find(number);
         let facets = drawn.facets(placed);
-        let (linear, translation) = placed.matrix();
         let corners = facets.corners(triangle);
         let places = places(projection, placed, &corners);
-        let weights = weights(&places, at);
+        let [a, b, c] = places.map(|p| DVec3::new(p.x, p.y, p.w));
+        Self {
+            projection,
+            placed,
+            facets,
+            triangle,
+            corners,
+            depths: places.map(|place| place.a),
+            sides: [b.cross(c), c.cross(a), a.cross(b)],
+            to_world: placed.matrix(),
+        }
+    }
+
+    /// What is seen of it at a place, in pixels.
+    pub fn at(&self, at: DVec2) -> Fragment {
+        let Self {
+            projection,
+            placed,
+            facets,
+            triangle,
+            corners,
+            depths,
+            to_world: (linear, translation),
+            ..
+        } = *self;
+        let weights = weights(&self.sides, at);
         let local = corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2];
-        let mut fragment = Self {
+        let mut fragment = Fragment {
             hit: Hit {
                 t: 0.0,
                 u: weights[1] as f32,
@@ -62,7 +103,7 @@ impl Fragment {
                 shape: placed.shape,
                 primitive: facets.primitive(triangle),
             },
-            a: places[0].a * weights[0] + places[1].a * weights[1] + places[2].a * weights[2],
+            a: depths[0] * weights[0] + depths[1] * weights[1] + depths[2] * weights[2],
             position: linear * local + translation,
             weights,
             on_patch: None,
@@ -89,6 +130,13 @@ impl Fragment {
             fragment.on_patch = Some(point.sample);
         }
         fragment
+    }
+}
+
+impl Fragment {
+    /// What is seen at a place, in pixels, of the triangle with that number.
+    pub fn new(drawn: &Drawn<'_>, projection: &Projection, number: u32, at: DVec2) -> Self {
+        Face::new(drawn, projection, number).at(at)
     }
 
     /// What is known of the surface there, of the arguments of [`Fragment::new`].
@@ -180,14 +228,9 @@ fn normal_in_world(placed: &Placed, normal: Vec3) -> Vec3 {
 
 /// The barycentric coordinates of the point of a triangle that is seen at a place: not negative, even where the grid has
 /// given a triangle a place that lies beside it.
-fn weights(places: &[Place; 3], at: DVec2) -> [f64; 3] {
-    let [a, b, c] = places.map(|p| DVec3::new(p.x, p.y, p.w));
+fn weights(sides: &[DVec3; 3], at: DVec2) -> [f64; 3] {
     let way = at.extend(1.0);
-    let weights = [
-        b.cross(c).dot(way),
-        c.cross(a).dot(way),
-        a.cross(b).dot(way),
-    ];
+    let weights = sides.map(|side| side.dot(way));
     let sign = weights.iter().sum::<f64>().signum();
     let weights = weights.map(|weight| (weight * sign).max(0.0));
     let sum: f64 = weights.iter().sum();

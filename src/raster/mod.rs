@@ -29,7 +29,7 @@ mod agreement;
 pub use agreement::{ALLOWED, Agreement, Quantity, TOLERANCE, agreement};
 pub use depth::DepthFormat;
 pub use drawn::Drawn;
-pub use fragment::{Attributes, Fragment};
+pub use fragment::{Attributes, Face, Fragment};
 pub use pattern::{COUNTS, Pattern};
 pub use projection::{Line, Place, Projection};
 pub use shade::{Batch, Blocked, Lighting, ShadeSettings, Shader, Shading};

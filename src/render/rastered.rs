@@ -4,7 +4,7 @@
 
 use std::ops::Range;
 
-use glam::{DVec2, Vec2};
+use glam::DVec2;
 
 use super::options::Options;
 use super::origin::Outcome;
@@ -20,16 +20,19 @@ use crate::filter::Filter;
 use crate::image::Image;
 use crate::integrator::Raster;
 use crate::interaction::Ray;
+use crate::lanes::{self, Lanes, MAX_LANES, Task};
 use crate::material::Material;
-use crate::raster::{Batch, Canvas, Drawn, Fragment, Projection, Shader, Visibility};
+use crate::raster::{Batch, Canvas, Drawn, Face, Projection, Shader, Visibility};
 use crate::scene::Scene;
-use crate::sensor::{Film, Window};
+use crate::sensor::{Film, Sensor, Window};
 
 /// The integrator whose pictures these are.
 pub(super) const NAME: &str = "raster";
 
 /// Rows of pixels of a unit of work.
 const ROWS: u32 = 16;
+/// So many fragments before a triangle is looked at its memory is asked for, as that of a fine mesh is far off.
+const AHEAD: usize = 8;
 
 /// Whether a render's image is drawn by the z-buffer, so that no ray is traced.
 pub(super) fn draws(description: &Description, options: &Options) -> bool {
@@ -204,6 +207,8 @@ struct Row {
     weights: Vec<f32>,
     /// Of the pixels from left to right.
     parts: Vec<Part>,
+    /// To each of these.
+    rays: Vec<Ray>,
 }
 
 /// What is seen at some of a pixel's samples.
@@ -211,7 +216,10 @@ struct Part {
     column: u32,
     /// Which part of the samples these are.
     share: f32,
-    ray: Ray,
+    /// Where it is looked at, in pixels of the film.
+    place: DVec2,
+    /// Of the triangle that is seen.
+    number: Option<u32>,
     /// The points whose colours make it up; none where nothing is there.
     points: Range<usize>,
 }
@@ -221,6 +229,7 @@ impl Row {
         self.batch.clear();
         self.weights.clear();
         self.parts.clear();
+        self.rays.clear();
     }
 }
 
@@ -229,11 +238,12 @@ impl Part {
     fn color<C: ColorModel>(
         &self,
         shader: &Shader<'_, C>,
+        ray: &Ray,
         weights: &[f32],
         colors: &[C::Sample],
     ) -> (C::Sample, f32) {
         if self.points.is_empty() {
-            return shader.background(&self.ray);
+            return shader.background(ray);
         }
         let mut sum = C::Sample::zero();
         for point in self.points.clone() {
@@ -263,11 +273,14 @@ impl<C: ColorModel> Picture<'_, C> {
             for (shader, colors) in self.shaders.iter().zip(&mut colors) {
                 shader.shade(&row.batch, None, colors);
             }
+            let mut rays = &row.rays[..];
             for parts in row.parts.chunk_by(|a, b| a.column == b.column) {
+                let (of_pixel, others) = rays.split_at(parts.len());
+                rays = others;
                 for (pass, (shader, colors)) in (0..).zip(self.shaders.iter().zip(&colors)) {
                     let (mut sum, mut alpha) = (C::Sample::zero(), 0.0);
-                    for part in parts {
-                        let (color, opaque) = part.color(shader, &row.weights, colors);
+                    for (part, ray) in parts.iter().zip(of_pixel) {
+                        let (color, opaque) = part.color(shader, ray, &row.weights, colors);
                         sum += color * part.share;
                         alpha += opaque * part.share;
                     }
@@ -312,35 +325,82 @@ impl<C: ColorModel> Picture<'_, C> {
                     true => [0.5; 2],
                     false => pattern.place(sample),
                 };
-                let place = DVec2::new(f64::from(left + x) + dx, f64::from(top + y) + dy);
-                let ray = self.ray(place);
-                let first = row.weights.len();
-                if let Some(number) = *number {
-                    let (drawn, projection) = (&self.drawn, &self.projection);
-                    let fragment = Fragment::new(drawn, projection, number, place);
-                    // All shaders want the same points.
-                    self.shaders[0].add_points(
-                        &mut row.batch,
-                        (drawn, projection),
-                        number,
-                        (&ray, &fragment),
-                        &mut row.weights,
-                    );
-                }
                 row.parts.push(Part {
                     column: x,
                     share: samples as f32 / count as f32,
-                    ray,
-                    points: first..row.weights.len(),
+                    place: DVec2::new(f64::from(left + x) + dx, f64::from(top + y) + dy),
+                    number: *number,
+                    points: 0..0,
                 });
             }
         }
+        self.scene.tracer().kernel().run(RaysThrough {
+            sensor: &self.view.sensor,
+            size: DVec2::new(self.film.width.into(), self.film.height.into()),
+            time: self.time,
+            parts: &row.parts,
+            rays: &mut row.rays,
+        });
+        let (drawn, projection) = (&self.drawn, &self.projection);
+        let mut last: Option<(u32, Face<'_, '_>)> = None;
+        for (i, ray) in row.rays.iter().enumerate() {
+            let number = |i: usize| row.parts.get(i).and_then(|part| part.number);
+            if let Some(number) = number(i + 2 * AHEAD) {
+                drawn.fetch(number);
+            }
+            if let Some(number) = number(i + AHEAD) {
+                drawn.fetch_corners(number);
+            }
+            let part = &mut row.parts[i];
+            let first = row.weights.len();
+            if let Some(number) = part.number {
+                let face = match last.take() {
+                    Some(face) if face.0 == number => face,
+                    _ => (number, Face::new(drawn, projection, number)),
+                };
+                let fragment = face.1.at(part.place);
+                last = Some(face);
+                // All shaders want the same points.
+                self.shaders[0].add_points(
+                    &mut row.batch,
+                    (drawn, projection),
+                    number,
+                    (ray, &fragment),
+                    &mut row.weights,
+                );
+            }
+            part.points = first..row.weights.len();
+        }
     }
+}
 
-    /// The sensor's ray through a place of the film, in pixels.
-    fn ray(&self, place: DVec2) -> Ray {
-        let size = DVec2::new(self.film.width.into(), self.film.height.into());
-        let place = (place / size).as_vec2();
-        self.view.sensor.ray(place, Vec2::splat(0.5), self.time)
+/// Adds the sensor's rays through places of the film.
+struct RaysThrough<'a> {
+    sensor: &'a Sensor,
+    /// Of the film, in pixels.
+    size: DVec2,
+    time: f32,
+    parts: &'a [Part],
+    rays: &'a mut Vec<Ray>,
+}
+
+impl Task for RaysThrough<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<F: Lanes>(self) {
+        let times = [self.time; MAX_LANES];
+        for parts in self.parts.chunks(F::WIDTH) {
+            let mut rows = [F::ROW; 2];
+            for (lane, part) in parts.iter().enumerate() {
+                let place = (part.place / self.size).as_vec2();
+                (rows[0][lane], rows[1][lane]) = (place.x, place.y);
+            }
+            let film = lanes::Vec2::<F>::load(&rows);
+            let lens = lanes::Vec2::splat(0.5);
+            let times = &times[..parts.len()];
+            self.sensor
+                .rays(film, lens, times, |ray| self.rays.push(ray));
+        }
     }
 }
