@@ -713,7 +713,7 @@ impl<'a> Series<'a> {
         let (arguments, up) = (&self.arguments.staging, scene.up_axis());
         let staging = Staging {
             deforms,
-            ..arguments.staging(up, self.arguments.image.overrides().size, turns)
+            ..arguments.staging(up, &self.arguments.image.overrides(), turns)
         };
         let (budget, session) = (&self.budget, &mut self.session);
         let (mut description, text) =

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use etendue::render::{Background, Finish, Lighting, Staging, UpAxis};
+use etendue::render::{Background, Finish, Lighting, Overrides, Staging, UpAxis};
 use glam::DVec3;
 
 use super::parse;
@@ -36,9 +36,9 @@ pub(super) struct StagingArguments {
     /// lights (glTF, in candela and lux: a radiance of 1 is 1 cd/m²) and nothing else, or else the studio
     #[arg(long, default_value = "auto", value_name = "NAME|IMAGE", value_parser = lighting, help_heading = BARE)]
     light: Lighting,
-    /// What is seen beside it: "sky", a radiance such as 1,1,1, which lights it in place of the sky, or "transparent", which
-    /// leaves out the ground too
-    #[arg(long, default_value = "sky", value_name = "R,G,B|transparent", value_parser = background, help_heading = BARE)]
+    /// What is seen beside it: "sky", or in place of that a radiance such as 1,1,1 or an image of all around, which light it
+    /// too; or "transparent", which leaves out the ground too
+    #[arg(long, default_value = "sky", value_name = "R,G,B|IMAGE|transparent", value_parser = background, help_heading = BARE)]
     background: Background,
     /// Let it float
     #[arg(long, help_heading = BARE)]
@@ -69,10 +69,10 @@ impl StagingArguments {
         given.map(|(_, option)| option)
     }
 
-    /// What they ask for, of an image of this size.
-    pub(super) fn staging(&self, up: UpAxis, size: Option<(u32, u32)>, turns: bool) -> Staging {
+    /// What they ask for, of such an image.
+    pub(super) fn staging(&self, up: UpAxis, image: &Overrides, turns: bool) -> Staging {
         let default = Staging::default();
-        let aspect = size.filter(|(width, height)| *width > 0 && *height > 0);
+        let size = image.size.map(|(width, height)| [width, height]);
         Staging {
             up,
             azimuth: self.azimuth,
@@ -80,13 +80,12 @@ impl StagingArguments {
             distance: self.distance,
             fov: self.fov,
             target: self.target,
-            aspect: aspect.map_or(default.aspect, |(width, height)| {
-                width as f32 / height as f32
-            }),
+            size: size.filter(|s| !s.contains(&0)).unwrap_or(default.size),
+            samples: image.spp.filter(|n| *n > 0).unwrap_or(default.samples),
             all_around: turns,
             finish: self.material.clone(),
             lighting: self.light.clone(),
-            background: self.background,
+            background: self.background.clone(),
             ground: !self.no_ground,
             deforms: false,
         }
@@ -147,7 +146,7 @@ fn distance(text: &str) -> Result<f32, String> {
     times.ok_or_else(|| "write a number from 0.01 to 1000".to_owned())
 }
 
-/// A radiance, or none.
+/// A radiance, an image, or none.
 fn background(text: &str) -> Result<Background, String> {
     match text {
         "sky" => return Ok(Background::Sky),
@@ -158,6 +157,10 @@ fn background(text: &str) -> Result<Background, String> {
     let possible = |v: &f32| v.is_finite() && *v >= 0.0;
     match numbers.as_deref() {
         Some(&[r, g, b]) if [r, g, b].iter().all(possible) => Ok(Background::Color([r, g, b])),
-        _ => Err("write sky, transparent, or a radiance as R,G,B, such as 1,1,1".to_owned()),
+        None if Path::new(text).is_file() => Ok(Background::Environment(text.into())),
+        _ => Err(
+            "write sky, transparent, a radiance as R,G,B, such as 1,1,1, or the name of an image that is there"
+                .to_owned(),
+        ),
     }
 }

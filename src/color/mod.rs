@@ -31,6 +31,6 @@ pub use primaries::Primaries;
 pub use response::Response;
 pub use rgb::Rgb;
 pub use samples::{Columns, Samples, Spectra, Spectral};
-pub use space::{Space, adaptation, chromaticity, xyz_of};
+pub use space::{Space, adaptation, chromaticity, hsv_to_rgb, rgb_to_hsv, xyz_of};
 pub use spectrum::Spectrum;
 pub use texels::{Packed, Pixels};

@@ -311,7 +311,8 @@ fn of_hue(degrees: f64, chroma: f64, least: f64) -> [f64; 3] {
     rgb.map(|v| v + least)
 }
 
-fn rgb_to_hsv(rgb: [f64; 3]) -> [f64; 3] {
+/// Hue in degrees from 0 to 360, saturation, and the value, which is the greatest component.
+pub fn rgb_to_hsv(rgb: [f64; 3]) -> [f64; 3] {
     let (hue, most, least) = hue(rgb);
     let saturation = if most == 0.0 {
         0.0
@@ -321,7 +322,8 @@ fn rgb_to_hsv(rgb: [f64; 3]) -> [f64; 3] {
     [hue, saturation, most]
 }
 
-fn hsv_to_rgb([hue, saturation, value]: [f64; 3]) -> [f64; 3] {
+/// The opposite of [`rgb_to_hsv`]. Hues of other degrees go round.
+pub fn hsv_to_rgb([hue, saturation, value]: [f64; 3]) -> [f64; 3] {
     let chroma = saturation * value;
     of_hue(hue, chroma, value - chroma)
 }

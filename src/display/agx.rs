@@ -1,94 +1,248 @@
-//! AgX as Benjamin Wrensch's *Minimal AgX implementation* (2023) has it, after Troy Sobotka's view of scene-referred light
-//! (github.com/sobotka/AgX, 2022): the primaries are drawn toward grey, so that bright saturated colours go to white instead of
-//! to a corner; a curve over 16.5 stops, from 10 below to 6.5 above middle grey, has slope 2 in the middle; the primaries go
-//! back, which in Sobotka's configuration they do not: its colours are paler, its greys and the curve are the same. The curve
-//! is the one that Wrensch's polynomials approximate.
+//! AgX, Troy Sobotka's view of scene-referred light (github.com/sobotka/AgX, 2022), in the form that Eary Chow gave it
+//! (github.com/EaryChow/AgX_LUT_Gen, 2023) and Blender has had since 4.0: what Blender bakes into a table of 57³ colours is
+//! computed here. In BT.2020 the primaries are drawn toward grey and turned a little, so that bright saturated colours go to
+//! white instead of to a corner; a curve over 16.5 stops, from 10 below to 6.5 above middle grey, has slope 2.4 there and
+//! leaves middle grey where it is; hues turn by 40 % of what the curve alone would turn them; the primaries go back out. What
+//! lies outside of a gamut is moved toward grey before and after.
 
 use glam::{DMat3, DVec3};
 
-/// What draws BT.709's primaries toward grey, by columns.
+use crate::color::{Primaries, hsv_to_rgb, rgb_to_hsv};
+
+/// What draws BT.2020's primaries toward grey, by columns.
 const INSET: DMat3 = DMat3::from_cols(
     DVec3::new(
-        0.842_479_062_253_094,
-        0.042_328_242_261_012_3,
-        0.042_375_654_905_705_1,
+        0.856_627_153_315_983,
+        0.137_318_972_929_847,
+        0.111_898_212_999_95,
     ),
-    DVec3::new(0.078_433_599_999_999_2, 0.878_468_636_469_772, 0.078_433_6),
     DVec3::new(
-        0.079_223_745_147_764_3,
-        0.079_166_127_460_543_4,
-        0.879_142_973_793_104,
+        0.095_121_240_538_158_8,
+        0.761_241_990_602_591,
+        0.076_799_418_603_190_3,
+    ),
+    DVec3::new(
+        0.048_251_606_145_858_3,
+        0.101_439_036_467_562,
+        0.811_302_368_396_859,
     ),
 );
+/// What takes them out again, further than they were.
+const OUTSET: DMat3 = DMat3::from_cols(
+    DVec3::new(
+        1.127_100_581_814_436_8,
+        -0.141_329_763_498_438_3,
+        -0.141_329_763_498_438_3,
+    ),
+    DVec3::new(
+        -0.110_606_643_096_603_2,
+        1.157_823_702_216_272,
+        -0.110_606_643_096_603_2,
+    ),
+    DVec3::new(
+        -0.016_493_938_717_834_6,
+        -0.016_493_938_717_834_6,
+        1.251_936_406_595_040_5,
+    ),
+);
+/// The luminances of BT.2020's primaries for the standard observer of CIE 2015.
+const LUMINANCES: DVec3 = DVec3::new(
+    0.265_818_037_025_045,
+    0.598_469_860_453_65,
+    0.135_712_102_521_305,
+);
 
-/// Stops above and below middle grey.
+/// Linear, and its code is [`MIDDLE`].
+const GREY: f64 = 0.18;
+/// Stops below and above middle grey.
 const RANGE: [f64; 2] = [-10.0, 6.5];
-/// The curve's slope at middle grey, where it has the value ½.
-const SLOPE: f64 = 2.0;
-/// How quickly the curve bends below and above.
-const POWERS: [f64; 2] = [3.0, 3.25];
+/// The exponent of the codes that the curve ends in.
+const GAMMA: f64 = 2.4;
+/// The curve's slope at middle grey.
+const SLOPE: f64 = 2.4;
+/// How quickly it bends.
+const POWER: f64 = 1.5;
+/// How much of the curve's own turning of hues is left.
+const TURNED: f64 = 0.4;
 
-/// Display-referred linear BT.709 in [0, 1].
-pub(super) fn view(rgb: [f32; 3]) -> [f32; 3] {
-    let drawn = INSET * DVec3::from(rgb.map(|v| f64::from(v.max(0.0))));
-    let [least, most] = RANGE;
-    let curved = drawn.to_array().map(|v| {
-        let stops = (v / 0.18).max(1e-10).log2();
-        curve(((stops - least) / (most - least)).clamp(0.0, 1.0))
-    });
-    // The curve's codes are those of a display with exponent 2.2.
-    let back = INSET.inverse() * DVec3::from(curved);
-    back.to_array().map(|v| v.clamp(0.0, 1.0).powf(2.2) as f32)
+/// What the view is made of.
+#[derive(Clone, Debug)]
+pub(super) struct Agx {
+    from_bt709: DMat3,
+    to_bt709: DMat3,
+    curve: Curve,
+    /// Luminances of BT.709's primaries.
+    luminances: DVec3,
 }
 
-/// From [0, 1] to [0, 1]: through (0, 0), (pivot, ½) and (1, 1), there with slope 2, with x/(1 + xᵖ)^(1/p) on both
-/// sides.
-fn curve(x: f64) -> f64 {
-    let pivot = -RANGE[0] / (RANGE[1] - RANGE[0]);
-    let side = if x < pivot { 0 } else { 1 };
-    let (length, power) = ([pivot, 1.0 - pivot][side], POWERS[side]);
-    // Chosen so that the end is met.
-    let scale = SLOPE * length / ((SLOPE * length / 0.5).powf(power) - 1.0).powf(1.0 / power);
-    let t = SLOPE * (x - pivot).abs() / scale;
-    let bent = scale * t / (1.0 + t.powf(power)).powf(1.0 / power);
-    if side == 0 { 0.5 - bent } else { 0.5 + bent }
+impl Agx {
+    pub(super) fn new() -> Self {
+        let xyz = |primaries: Primaries| primaries.to_xyz().expect("they are a space");
+        let from_bt709 = xyz(Primaries::BT2020).inverse() * xyz(Primaries::BT709);
+        Self {
+            from_bt709,
+            to_bt709: from_bt709.inverse(),
+            curve: Curve::new(),
+            luminances: from_bt709.transpose() * LUMINANCES,
+        }
+    }
+
+    /// Display-referred linear BT.709 in [0, 1].
+    pub(super) fn view(&self, rgb: [f32; 3]) -> [f32; 3] {
+        let finite = rgb.map(|v| {
+            if v.is_nan() {
+                0.0
+            } else {
+                f64::from(v.clamp(-65504.0, 65504.0))
+            }
+        });
+        let wide = self.from_bt709 * DVec3::from(finite);
+        let drawn = INSET * within(wide, |rgb| with_opponent(rgb, LUMINANCES));
+        let curved = drawn.map(|v| self.curve.at(v));
+        let [before, _, _] = rgb_to_hsv(drawn.into());
+        let [after, saturation, value] = rgb_to_hsv(curved.into());
+        let turn = (after - before + 540.0).rem_euclid(360.0) - 180.0;
+        let mixed = hsv_to_rgb([before + TURNED * turn, saturation, value]);
+        let shown = self.to_bt709 * (OUTSET * DVec3::from(mixed));
+        // The darker, the more counts the opponent: else greens of BT.2020 would shine.
+        let shown = within(shown, |rgb| {
+            let luminance = rgb.dot(self.luminances);
+            let share = luminance.clamp(0.0, 1.0).powf(0.08);
+            let opposed = with_opponent(rgb, self.luminances);
+            opposed + share * (luminance - opposed)
+        });
+        shown.to_array().map(|v| v.clamp(0.0, 1.0) as f32)
+    }
+}
+
+/// A color moved toward grey until no component is negative, and dimmed to the brightness it had, if it had less.
+fn within(rgb: DVec3, brightness: impl Fn(DVec3) -> f64) -> DVec3 {
+    let moved = rgb + (-rgb.min_element()).max(0.0);
+    let [had, has] = [rgb, moved].map(brightness);
+    if has > had {
+        moved * (had.max(0.0) / has)
+    } else {
+        moved
+    }
+}
+
+/// A luminance, and by how much the opponent colour is darker than it could be.
+fn with_opponent(rgb: DVec3, luminances: DVec3) -> f64 {
+    let opponent = DVec3::splat(rgb.max_element()) - rgb;
+    rgb.dot(luminances) + opponent.max_element() - opponent.dot(luminances)
+}
+
+/// From linear values by way of stops to linear values: straight at middle grey, and below and above it bent by
+/// x/(1 + xᵖ)^(1/p).
+#[derive(Clone, Debug)]
+struct Curve {
+    /// Middle grey in parts of the range, and its code.
+    pivot: [f64; 2],
+    /// So that the ends are met, below and above.
+    scales: [f64; 2],
+}
+
+impl Curve {
+    fn new() -> Self {
+        let [x, y] = [-RANGE[0] / (RANGE[1] - RANGE[0]), GREY.powf(1.0 / GAMMA)];
+        let scale = |[x, y]: [f64; 2]| {
+            let straight = SLOPE * x;
+            straight / ((straight / y).powf(POWER) - 1.0).powf(1.0 / POWER)
+        };
+        Self {
+            pivot: [x, y],
+            scales: [scale([x, y]), scale([1.0 - x, 1.0 - y])],
+        }
+    }
+
+    /// In [0, 1].
+    fn at(&self, linear: f64) -> f64 {
+        let stops = (linear / GREY).max(1e-10).log2();
+        let x = ((stops - RANGE[0]) / (RANGE[1] - RANGE[0])).clamp(0.0, 1.0);
+        let [middle, code] = self.pivot;
+        let bent = |scale: f64| {
+            let t = SLOPE * (x - middle).abs() / scale;
+            scale * t / (1.0 + t.powf(POWER)).powf(1.0 / POWER)
+        };
+        let [below, above] = self.scales;
+        let code = if x < middle {
+            code - bent(below)
+        } else {
+            code + bent(above)
+        };
+        code.max(0.0).powf(GAMMA)
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// Wrensch's polynomial of degree 6, which is nowhere far from a curve like this.
+    /// Colours of the table that Blender 5.0.1 has for sRGB, which OpenColorIO interpolates in; codes of a display with
+    /// exponent 2.4. What lies outside of BT.709 was weighted there with other luminances.
     #[test]
-    fn the_curve_is_what_the_published_polynomial_approximates() {
-        const COEFFICIENTS: [f64; 7] = [-0.00232, 0.1191, 0.4298, -6.868, 31.96, -40.14, 15.5];
-        let mut square = 0.0;
-        for i in 0..=1000 {
-            let x = f64::from(i) / 1000.0;
-            let fit = COEFFICIENTS.iter().rev().fold(0.0, |sum, c| sum * x + c);
-            square += (fit - curve(x)).powi(2) / 1001.0;
+    fn colours_are_those_of_blenders_table() {
+        let inside = [
+            (
+                [0.1864287, 0.90003359, 0.17537631],
+                [0.581524, 0.764953, 0.542245],
+            ),
+            (
+                [0.023458264, 9.2955782e-05, 0.0016823973],
+                [0.171045, 0.0, 0.047509],
+            ),
+            (
+                [0.31899933, 0.11199654, 0.030559929],
+                [0.614038, 0.388778, 0.20469],
+            ),
+            (
+                [0.011154942, 0.0017793422, 0.022352331],
+                [0.123668, 0.072907, 0.177353],
+            ),
+            (
+                [8.4463958, 0.091274136, 0.232217],
+                [1.0, 0.755212, 0.738304],
+            ),
+        ];
+        let outside = [
+            (
+                [1.1731261, 4.5256838, -1.0666798],
+                [0.830673, 0.931418, 0.625665],
+            ),
+            (
+                [-0.2691785, 0.058822428, 0.98103397],
+                [0.0, 0.489438, 0.738827],
+            ),
+            (
+                [-8.3005125, 16.655953, -2.8523263],
+                [0.723843, 1.0, 0.757673],
+            ),
+            (
+                [0.76331291, -0.068683353, -0.026610318],
+                [0.769988, 0.0, 0.170278],
+            ),
+        ];
+        let agx = Agx::new();
+        for (colors, tolerance) in [(&inside[..], 1e-4), (&outside[..], 2e-3)] {
+            for (rgb, codes) in colors {
+                let seen = agx.view(*rgb).map(|v| f64::from(v).powf(1.0 / 2.4));
+                let near = (0..3).all(|c| (seen[c] - codes[c]).abs() < tolerance);
+                assert!(near, "{rgb:?}: {seen:?}, not {codes:?}");
+            }
         }
-        assert!(square.sqrt() < 0.003, "{square}");
-        assert!(curve(0.0).abs() < 1e-9 && (curve(1.0) - 1.0).abs() < 1e-9);
     }
 
     #[test]
-    fn middle_grey_is_half_a_code_and_bright_colours_go_to_white() {
-        let grey = view([0.18; 3]);
-        assert!(
-            grey.iter().all(|v| (v.powf(1.0 / 2.2) - 0.5).abs() < 1e-4),
-            "{grey:?}"
-        );
-        let [red, green, blue] = view([80.0, 0.8, 0.8]);
-        assert!(
-            red > 0.9 && green > 0.2 && blue > 0.2,
-            "{red} {green} {blue}"
-        );
-        assert_eq!(view([0.0; 3]), [0.0; 3]);
-        assert!(
-            view([f32::NAN, -1.0, f32::INFINITY])
-                .iter()
-                .all(|v| (0.0..=1.0).contains(v))
-        );
+    fn greys_stay_grey_and_what_is_no_color_is_shown_too() {
+        let agx = Agx::new();
+        assert_eq!(agx.view([0.0; 3]), [0.0; 3]);
+        for (grey, shown) in [(0.18, 0.18), (0.18 * 2f32.powf(6.5), 1.0)] {
+            let seen = agx.view([grey; 3]);
+            assert!(seen.iter().all(|v| (v - shown).abs() < 1e-4), "{seen:?}");
+        }
+        for odd in [f32::NAN, -1.0, f32::INFINITY, f32::MIN] {
+            let seen = agx.view([odd, 0.5, -0.0]);
+            assert!(seen.iter().all(|v| (0.0..=1.0).contains(v)), "{seen:?}");
+        }
     }
 }

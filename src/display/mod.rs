@@ -42,7 +42,7 @@ pub enum View {
     Sigmoid,
     /// By the luminance of each place's neighbourhood.
     Local,
-    /// AgX.
+    /// AgX, as Blender has it.
     Agx,
     /// ACES 1.
     Aces,
@@ -201,7 +201,10 @@ impl DisplayTransform {
             View::Standard | View::Agx | View::Aces => {}
         }
         match self.view {
-            View::Agx => each(pixels, agx::view),
+            View::Agx => {
+                let agx = agx::Agx::new();
+                each(pixels, |rgb| agx.view(rgb));
+            }
             View::Aces => {
                 let aces = aces::Aces::new();
                 each(pixels, |rgb| aces.view(rgb));

@@ -429,7 +429,7 @@ fn seen_quarters(path: &Path) -> ([[f32; 4]; 4], Vec<String>) {
         elevation: Some(0.0),
         lighting: Lighting::Sky,
         background: etendue::render::Background::Transparent,
-        aspect: 1.0,
+        size: [32, 32],
         ..Staging::default()
     };
     let options = description::Options::default();

@@ -44,7 +44,7 @@ pub(super) fn pose(mesh: &Mesh, (min, max): (Vec3, Vec3), staging: &Staging) -> 
     let sideways = forward.cross(upright);
     let center = center.as_dvec3();
     let half = f64::from(staging.fov.unwrap_or(FOV)).to_radians() / 2.0;
-    let aspect = f64::from(staging.aspect);
+    let aspect = staging.aspect();
     let tangents = [
         half.tan() * aspect.max(1.0),
         half.tan() * (1.0 / aspect).max(1.0),
@@ -133,7 +133,7 @@ mod tests {
         let forward = (pose.target - pose.eye).normalize();
         let sideways = forward.cross(pose.up).normalize();
         let half = f64::from(staging.fov.unwrap_or(FOV)).to_radians() / 2.0;
-        let aspect = f64::from(staging.aspect);
+        let aspect = staging.aspect();
         let tangents = [
             half.tan() * aspect.max(1.0),
             half.tan() * (1.0 / aspect).max(1.0),
@@ -159,9 +159,9 @@ mod tests {
             Vec3::new(0.01, 5.0, 0.3),
         ] {
             let mesh = cloud(stretch);
-            for (up, aspect, fov) in [
-                (super::super::UpAxis::Y, 4.0 / 3.0, None),
-                (super::super::UpAxis::Z, 0.5, Some(60.0)),
+            for (up, size, fov) in [
+                (super::super::UpAxis::Y, [4, 3], None),
+                (super::super::UpAxis::Z, [1, 2], Some(60.0)),
             ] {
                 for angles in [
                     None,
@@ -171,7 +171,7 @@ mod tests {
                 ] {
                     let staging = Staging {
                         up,
-                        aspect,
+                        size,
                         fov,
                         azimuth: angles.map(|a| a.0),
                         elevation: angles.map(|a| a.1),

@@ -140,11 +140,11 @@ pub fn describe_mesh(
         let warning = Error::input(message).at(&Location::of_file(path));
         loaded.warnings.extend_from_slice(warning.problems());
     }
-    if let (Lighting::Environment(_), Background::Color(_)) =
-        (&staging.lighting, staging.background)
+    if let (Lighting::Environment(_), Background::Color(_) | Background::Environment(_)) =
+        (&staging.lighting, &staging.background)
     {
         let message =
-            "what is seen beside the mesh is the image that lights it: --background is left out";
+            "what is seen beside the mesh is the image of --light: --background is left out";
         let warning = Error::input(message).at(&Location::of_file(path));
         loaded.warnings.extend_from_slice(warning.problems());
     }
@@ -152,7 +152,7 @@ pub fn describe_mesh(
     let mut subject = Subject {
         plugin,
         bounds,
-        camera: camera.and_then(|camera| own_camera(&camera, staging.aspect)),
+        camera: camera.and_then(|camera| own_camera(&camera, staging.aspect())),
         lights: &lights,
         mesh: &loaded.mesh,
         bodies: surface::bodies(&loaded, &surfaces),
@@ -232,7 +232,7 @@ struct OwnCamera {
 }
 
 /// A camera as a scene file says it, of a film of this width over its height; `None` where it sees nothing.
-fn own_camera(camera: &GltfCamera, aspect: f32) -> Option<OwnCamera> {
+fn own_camera(camera: &GltfCamera, aspect: f64) -> Option<OwnCamera> {
     // Mitsuba's camera looks along +z with +x to the left: half a turn around y.
     let to_world = camera.to_world * DMat4::from_scale(DVec3::new(-1.0, 1.0, -1.0));
     let GltfCamera { near, far, .. } = *camera;
@@ -242,7 +242,7 @@ fn own_camera(camera: &GltfCamera, aspect: f32) -> Option<OwnCamera> {
         }
         // The film's width is 2 in the units of `to_world`.
         Projection::Orthographic { half_height, .. } if half_height > 0.0 => {
-            let half_width = half_height * f64::from(aspect);
+            let half_width = half_height * aspect;
             let scale = DVec3::new(half_width, half_width, 1.0);
             (to_world * DMat4::from_scale(scale), None)
         }
@@ -333,13 +333,21 @@ fn scene(subject: &Subject<'_>, file: &Path, bare: bool) -> String {
             ("perspective", field(fov, "smaller"), lookat)
         }
     };
-    let hidden = match staging.background {
+    let hidden = match &staging.background {
         Background::Transparent => r#"<boolean name="hide_emitters" value="true"/>"#,
-        Background::Sky | Background::Color(_) => "",
+        Background::Sky | Background::Color(_) | Background::Environment(_) => "",
     };
-    let pixels = match staging.background {
+    let pixels = match &staging.background {
         Background::Transparent => r#"<string name="pixel_format" value="rgba"/>"#,
-        Background::Sky | Background::Color(_) => "",
+        Background::Sky | Background::Color(_) | Background::Environment(_) => "",
+    };
+    let [width, height] = staging.size;
+    let samples = staging.samples;
+    // Which of them takes such a number.
+    let sampler = if samples.isqrt().pow(2) == samples {
+        "stratified"
+    } else {
+        "multijitter"
     };
     let key = (-0.9 * pose.right + 0.7 * pose.front + 1.2 * up).normalize();
     format!(
@@ -349,8 +357,8 @@ fn scene(subject: &Subject<'_>, file: &Path, bare: bool) -> String {
         <float name="near_clip" value="{near}"/>
         <float name="far_clip" value="{far}"/>
         <transform name="to_world">{to_world}</transform>
-        <film type="hdrfilm"><integer name="width" value="1024"/><integer name="height" value="768"/>{pixels}</film>
-        <sampler type="stratified"><integer name="sample_count" value="64"/></sampler>
+        <film type="hdrfilm"><integer name="width" value="{width}"/><integer name="height" value="{height}"/>{pixels}</film>
+        <sampler type="{sampler}"><integer name="sample_count" value="{samples}"/></sampler>
     </sensor>
     {lights}{ground}{bodies}
 </scene>"#,

@@ -77,13 +77,15 @@ pub enum Lighting {
 }
 
 /// What is seen beside a bare mesh.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub enum Background {
     /// The sky that lights it.
     #[default]
     Sky,
     /// A sky of this radiance, linear BT.709.
     Color([f32; 3]),
+    /// In place of the sky, an image of all around by longitude and latitude.
+    Environment(PathBuf),
     /// Nothing: the image has opacity, and there is no ground.
     Transparent,
 }
@@ -103,8 +105,10 @@ pub struct Staging {
     pub fov: Option<f32>,
     /// The point that it looks at.
     pub target: Option<DVec3>,
-    /// The film's width over its height.
-    pub aspect: f32,
+    /// The film's width and height in pixels, both above 0.
+    pub size: [u32; 2],
+    /// Samples a pixel, above 0.
+    pub samples: u32,
     /// Whether the mesh is to be seen from all around, as a camera on a turntable does.
     pub all_around: bool,
     /// What the mesh is made of.
@@ -128,7 +132,8 @@ impl Default for Staging {
             distance: None,
             fov: None,
             target: None,
-            aspect: 4.0 / 3.0,
+            size: [1024, 768],
+            samples: 64,
             all_around: false,
             finish: Finish::Auto,
             lighting: Lighting::Auto,
@@ -140,6 +145,11 @@ impl Default for Staging {
 }
 
 impl Staging {
+    /// The film's width over its height.
+    pub(super) fn aspect(&self) -> f64 {
+        f64::from(self.size[0]) / f64::from(self.size[1])
+    }
+
     /// Whether another camera is asked for than the file's own.
     pub(super) fn asks_for_camera(&self) -> bool {
         let angles = [self.azimuth, self.elevation, self.distance, self.fov];
@@ -231,22 +241,20 @@ impl Staging {
     /// The lights around a mesh at `center`: those of its own file, where there are any, else what is asked for; `key`
     /// points to where the lamp or the sun is.
     pub(super) fn lights(&self, center: Vec3, radius: f32, key: Vec3, own: &[GltfLight]) -> String {
-        let sky = |own: [f32; 3]| {
-            let [r, g, b] = match self.background {
-                Background::Color(color) => color,
-                Background::Sky | Background::Transparent => own,
-            };
+        let even = |[r, g, b]: [f32; 3]| {
             format!(
                 r#"<emitter type="constant"><rgb name="radiance" value="{r}, {g}, {b}"/></emitter>"#
             )
         };
+        let background = match &self.background {
+            Background::Sky | Background::Transparent => None,
+            Background::Color(color) => Some(even(*color)),
+            Background::Environment(path) => Some(self.environment(path)),
+        };
         if !own.is_empty() {
-            let backdrop = match self.background {
-                Background::Color(color) => sky(color),
-                Background::Sky | Background::Transparent => String::new(),
-            };
-            return backdrop + &lights::emitters(own);
+            return background.unwrap_or_default() + &lights::emitters(own);
         }
+        let sky = |own: [f32; 3]| background.clone().unwrap_or_else(|| even(own));
         match &self.lighting {
             Lighting::Auto | Lighting::Studio => {
                 let lamp = point(center + 4.0 * radius * key);
@@ -273,18 +281,19 @@ impl Staging {
                 )
             }
             Lighting::Sky => sky([0.9, 0.95, 1.0]),
-            Lighting::Environment(path) => {
-                let file = filename(path);
-                // Images of all around have y up.
-                let turn = match self.up {
-                    UpAxis::Auto | UpAxis::Y => "",
-                    UpAxis::Z => {
-                        r#"<transform name="to_world"><rotate x="1" angle="90"/></transform>"#
-                    }
-                };
-                format!(r#"<emitter type="envmap">{file}{turn}</emitter>"#)
-            }
+            Lighting::Environment(path) => self.environment(path),
         }
+    }
+
+    /// An image of all around as a light.
+    fn environment(&self, path: &Path) -> String {
+        let file = filename(path);
+        // Such images have y up.
+        let turn = match self.up {
+            UpAxis::Auto | UpAxis::Y => "",
+            UpAxis::Z => r#"<transform name="to_world"><rotate x="1" angle="90"/></transform>"#,
+        };
+        format!(r#"<emitter type="envmap">{file}{turn}</emitter>"#)
     }
 }
 
