@@ -7,6 +7,7 @@ use etendue::error::{Problem, Problems, Result};
 use etendue::render::{Options, Session, Silent};
 use serde_json::json;
 
+use super::folders::{Wanted, files};
 use super::memory::RunArguments;
 use super::overrides::{self, ImageArguments};
 use super::scene::SceneArguments;
@@ -19,7 +20,7 @@ use super::{output, report, status};
 #[derive(Args, Debug)]
 #[command(after_help = status::HELP)]
 pub(super) struct Arguments {
-    /// Scene files (.xml) or meshes
+    /// Scene files (.xml) or meshes, or folders of them
     #[arg(required = true, value_name = "SCENE")]
     inputs: Vec<PathBuf>,
     #[command(flatten)]
@@ -39,7 +40,7 @@ pub(super) struct Arguments {
 /// Runs the command; the answer is the exit status.
 pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     let mut worst = status::DONE;
-    for input in &arguments.inputs {
+    for input in &files(&arguments.inputs, Wanted::Scenes)? {
         let result = check(arguments, input);
         let name = input.display().to_string();
         if arguments.json {

@@ -12,6 +12,7 @@ use serde_json::json;
 
 use super::denoise::{self, DenoiseArguments};
 use super::display::DisplayArguments;
+use super::folders::{Wanted, files, pattern};
 use super::memory::MemoryArguments;
 use super::output::{self, Names};
 use super::{parse, report, status};
@@ -24,10 +25,10 @@ use super::{parse, report, status};
 #[derive(Args, Debug)]
 #[command(after_help = format!("{EXAMPLES}\n\n{}", status::HELP))]
 pub(super) struct Arguments {
-    /// Images
+    /// Images, or folders of them
     #[arg(required = true, value_name = "IN")]
     inputs: Vec<PathBuf>,
-    /// Where the image goes; {name} stands for the input's name
+    /// Where the image goes; {name} stands for the input's name, and a folder for FOLDER/{name}.png
     #[arg(short, long, value_name = "OUT")]
     output: String,
     /// Only this layer, such as albedo, light.lamp.diffuse or depth; "etendue info" lists them
@@ -64,7 +65,8 @@ Examples:
 
 /// Runs the command; the answer is the exit status.
 pub(super) fn run(arguments: &Arguments) -> Result<u8> {
-    let outputs = outputs(arguments)?;
+    let inputs = files(&arguments.inputs, Wanted::Images)?;
+    let outputs = outputs(arguments, &inputs)?;
     for output in &outputs {
         image::check_writable(output)?;
         arguments.display.transform().check(output)?;
@@ -73,8 +75,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     arguments.display.warn_unused(paths, arguments.quiet);
     let denoiser = arguments.denoising.denoiser(0)?;
     if let Some(columns) = arguments.sheet {
-        let images: Result<Vec<Image>> = arguments
-            .inputs
+        let images: Result<Vec<Image>> = inputs
             .iter()
             .map(|i| read(arguments, denoiser.as_ref(), i))
             .collect();
@@ -86,7 +87,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         )?;
         return Ok(status::DONE);
     }
-    for (input, output) in arguments.inputs.iter().zip(&outputs) {
+    for (input, output) in inputs.iter().zip(&outputs) {
         let image = read(arguments, denoiser.as_ref(), input)?;
         let metadata = Metadata::default().with("converted_from", input.display().to_string());
         write(arguments, output, &image, metadata)?;
@@ -95,7 +96,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
 }
 
 /// Of each input, or the one of a sheet.
-fn outputs(arguments: &Arguments) -> Result<Vec<PathBuf>> {
+fn outputs(arguments: &Arguments, inputs: &[PathBuf]) -> Result<Vec<PathBuf>> {
+    let pattern = match arguments.sheet {
+        Some(_) => arguments.output.as_str().into(),
+        None => pattern(&arguments.output, 1),
+    };
     let expanded = |input: &PathBuf| {
         let names = Names {
             input,
@@ -103,20 +108,20 @@ fn outputs(arguments: &Arguments) -> Result<Vec<PathBuf>> {
             sensor: "0",
             eye: None,
         };
-        names.expand(&arguments.output)
+        names.expand(&pattern)
     };
     let count = if arguments.sheet.is_some() {
         1
     } else {
-        arguments.inputs.len()
+        inputs.len()
     };
-    let outputs: Vec<PathBuf> = arguments.inputs[..count]
+    let outputs: Vec<PathBuf> = inputs[..count]
         .iter()
         .map(expanded)
         .collect::<Result<_>>()?;
-    let named = outputs.iter().zip(&arguments.inputs);
+    let named = outputs.iter().zip(inputs);
     let named = named.map(|(o, i)| (o.as_path(), i.display().to_string()));
-    let help = "name them after the inputs, as in -o out/{name}.png, or make one of all by --sheet";
+    let help = "name them after the inputs, as in -o out/{name}.png or -o out/, or make one of all by --sheet";
     output::check_distinct(named, help)?;
     Ok(outputs)
 }

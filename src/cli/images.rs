@@ -1,13 +1,13 @@
 //! What a call is to render: inputs × frames × sensors, each with an output of its own, known before the
 //! first of them is begun.
 
-use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 use etendue::budget::Budget;
 use etendue::error::{Error, Result};
-use etendue::render::{Session, is_mesh};
+use etendue::render::Session;
 
+use super::folders::{Wanted, files, pattern};
 use super::output::Names;
 use super::overrides::{self, Chosen, Sensors};
 use super::parse::Frames;
@@ -83,52 +83,12 @@ pub(super) struct Request<'a> {
     pub(super) budget: &'a Budget,
 }
 
-/// The inputs, with what stands in folders among them by name in place of these.
-fn files(inputs: &[PathBuf]) -> Result<Vec<PathBuf>> {
-    let mut all = Vec::with_capacity(inputs.len());
-    for input in inputs {
-        if !input.is_dir() {
-            all.push(input.clone());
-            continue;
-        }
-        let refused = |e: std::io::Error| Error::system("read", input, &e);
-        let entries = std::fs::read_dir(input).map_err(refused)?;
-        let mut files = Vec::new();
-        for entry in entries {
-            let path = entry.map_err(refused)?.path();
-            let is_scene = path
-                .extension()
-                .is_some_and(|e| e.eq_ignore_ascii_case("xml"));
-            if (is_scene || is_mesh(&path)) && path.is_file() {
-                files.push(path);
-            }
-        }
-        if files.is_empty() {
-            let message = format!("no scene and no mesh is in the folder {}", input.display());
-            return Err(Error::input(message).help("folders in it are not looked into"));
-        }
-        files.sort();
-        all.append(&mut files);
-    }
-    Ok(all)
-}
-
-/// Where images go: into a folder as pictures with the inputs' names, and the eyes' where there are several.
-fn pattern(output: &str, eyes: usize) -> Cow<'_, str> {
-    if output.ends_with(['/', std::path::MAIN_SEPARATOR]) || Path::new(output).is_dir() {
-        let folder = output.trim_end_matches(['/', std::path::MAIN_SEPARATOR]);
-        let eye = if eyes > 1 { "-{eye}" } else { "" };
-        return format!("{folder}/{{name}}{eye}.png").into();
-    }
-    output.into()
-}
-
 impl Request<'_> {
     /// All images, by input, frame and sensor.
     pub(super) fn images(&self) -> Result<Images> {
         let mut images = Images::default();
         let output = pattern(self.output, self.eyes.len());
-        for input in &files(self.inputs)? {
+        for input in &files(self.inputs, Wanted::Scenes)? {
             let chosen = match self.chosen(input) {
                 Ok(chosen) => chosen,
                 Err(error) => {

@@ -10,6 +10,7 @@ use etendue::mesh::{self, Per, ReadOptions};
 use etendue::render::{Options, SceneInfo, Session, Silent};
 use serde_json::{Map, Value, json};
 
+use super::folders::{Wanted, files};
 use super::memory::RunArguments;
 use super::overrides::{self, ImageArguments};
 use super::scene::{SceneArguments, is_scene};
@@ -21,7 +22,7 @@ use super::{output, report, status};
 #[derive(Args, Debug)]
 #[command(after_help = status::HELP)]
 pub(super) struct Arguments {
-    /// Scenes (.xml), meshes (.ply, .obj, .stl, .serialized, .gltf, .glb) or images
+    /// Scenes (.xml), meshes (.ply, .obj, .stl, .serialized, .gltf, .glb) or images, or folders of them
     #[arg(required = true, value_name = "FILE")]
     inputs: Vec<PathBuf>,
     #[command(flatten)]
@@ -41,7 +42,7 @@ pub(super) struct Arguments {
 /// Runs the command; the answer is the exit status.
 pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     let mut worst = status::DONE;
-    for input in &arguments.inputs {
+    for input in &files(&arguments.inputs, Wanted::Any)? {
         let mut object = match info(arguments, input) {
             Ok(object) => object,
             Err(error) => {

@@ -23,6 +23,7 @@ mod spectrum;
 
 mod available;
 mod display;
+mod folders;
 mod growth;
 mod hints;
 mod images;

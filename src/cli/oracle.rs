@@ -4,14 +4,13 @@ use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 use etendue::budget::Budget;
-use etendue::description::Description;
 use etendue::error::{Error, Result};
 use etendue::raster::{ALLOWED, Agreement, TOLERANCE};
-use etendue::render::{Options, Session, Silent, Staging, describe_mesh, find_sensor, is_mesh};
+use etendue::render::{Options, Session, Silent, Staging, find_sensor};
 use serde_json::json;
 
 use super::overrides::ImageArguments;
-use super::scene::ReadArguments;
+use super::scene::{ReadArguments, describe};
 use super::stop::Stop;
 use super::{output, report, status};
 
@@ -69,14 +68,8 @@ impl Subject<'_> {
     fn compare(&self, scene: &Path) -> Result<Agreement> {
         let options = self.read.options(None);
         let (mut session, budget) = (Session::default(), Budget::default());
-        let mut description = match is_mesh(scene) {
-            true => {
-                let bare = describe_mesh(scene, &Staging::default(), &options, &budget)?;
-                session.give(bare.mesh);
-                bare.description
-            }
-            false => Description::read(scene, &options, &budget)?,
-        };
+        let staging = Staging::default();
+        let (mut description, _) = describe(scene, &staging, &options, &budget, &mut session)?;
         self.image.overrides().apply(&mut description);
         let sensor = match self.image.sensor()? {
             Some(named) => find_sensor(&description, &named)?,

@@ -13,7 +13,7 @@ use etendue::profile::{self, Axis, Comparison, Effort, Profile, Settings, Subjec
 use super::memory::MemoryArguments;
 use super::overrides::MethodArguments;
 use super::progress::{self, Count, Steps, Told};
-use super::scene::SceneArguments;
+use super::scene::{SceneArguments, check};
 use super::stop::Stop;
 use super::{growth, output, parse, status};
 
@@ -82,7 +82,7 @@ Examples:
 impl Arguments {
     fn settings(&self, stop: &Stop) -> Result<Settings> {
         if let Some(input) = &self.input {
-            self.scene.check(input)?;
+            check(input)?;
         }
         let axes = match &*self.sweep {
             [] => Axis::ALL.to_vec(),

@@ -27,7 +27,7 @@ use super::memory::{RUN, RunArguments};
 use super::overrides::{IMAGE, ImageArguments};
 use super::parse::{self, Frames};
 use super::progress::{self, Take, Takers, Told, Voice, Watch};
-use super::scene::SceneArguments;
+use super::scene::{SceneArguments, describe};
 use super::staging::StagingArguments;
 use super::stereo::Eye;
 use super::stop::Stop;
@@ -716,8 +716,7 @@ impl<'a> Series<'a> {
             ..arguments.staging(up, &self.arguments.image.overrides(), turns)
         };
         let (budget, session) = (&self.budget, &mut self.session);
-        let (mut description, text) =
-            scene.describe_staged(&item.input, &staging, &options, budget, session)?;
+        let (mut description, text) = describe(&item.input, &staging, &options, budget, session)?;
         if let (Some(path), Some(text)) = (&arguments.write_scene, text) {
             etendue::file::write_atomically(path, text.as_bytes())?;
         }

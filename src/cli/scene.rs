@@ -99,44 +99,8 @@ impl SceneArguments {
             up: self.up_axis(),
             ..Staging::default()
         };
-        let (description, _) = self.describe_staged(input, &staging, options, budget, session)?;
+        let (description, _) = describe(input, &staging, options, budget, session)?;
         Ok(description)
-    }
-
-    /// The same with a bare mesh shown as asked for, whose scene is told as text.
-    pub(super) fn describe_staged(
-        &self,
-        input: &Path,
-        staging: &Staging,
-        options: &Options,
-        budget: &Budget,
-        session: &mut Session,
-    ) -> Result<(Description, Option<String>)> {
-        self.check(input)?;
-        if render::is_mesh(input) {
-            render::check_mesh(input, budget.limit())?;
-            let BareMesh {
-                description,
-                text,
-                mesh,
-            } = render::describe_mesh(input, staging, options, budget)?;
-            session.give(mesh);
-            return Ok((description, Some(text)));
-        }
-        Ok((Description::read(input, options, budget)?, None))
-    }
-
-    /// Refuses what is neither a scene nor a mesh by its name.
-    pub(super) fn check(&self, input: &Path) -> Result<()> {
-        if render::is_mesh(input) || is_scene(input) {
-            return Ok(());
-        }
-        let message = format!("{}: neither a scene nor a mesh", input.display());
-        Err(Error::input(message).help(if is_image(input) {
-            "it is an image: `etendue info` tells what it holds, `etendue convert` makes another of it"
-        } else {
-            "a scene is an .xml file, a mesh a .ply, .obj, .stl, .serialized, .gltf or .glb"
-        }))
     }
 
     /// Which way is up in a bare mesh.
@@ -147,4 +111,40 @@ impl SceneArguments {
             Up::Z => UpAxis::Z,
         }
     }
+}
+
+/// The scene in the file, or around the mesh in it, which is shown as asked for and told as text too. What is read may
+/// take that much memory; the session has the mesh then.
+pub(super) fn describe(
+    input: &Path,
+    staging: &Staging,
+    options: &Options,
+    budget: &Budget,
+    session: &mut Session,
+) -> Result<(Description, Option<String>)> {
+    check(input)?;
+    if render::is_mesh(input) {
+        render::check_mesh(input, budget.limit())?;
+        let BareMesh {
+            description,
+            text,
+            mesh,
+        } = render::describe_mesh(input, staging, options, budget)?;
+        session.give(mesh);
+        return Ok((description, Some(text)));
+    }
+    Ok((Description::read(input, options, budget)?, None))
+}
+
+/// Refuses what is neither a scene nor a mesh by its name.
+pub(super) fn check(input: &Path) -> Result<()> {
+    if render::is_mesh(input) || is_scene(input) {
+        return Ok(());
+    }
+    let message = format!("{}: neither a scene nor a mesh", input.display());
+    Err(Error::input(message).help(if is_image(input) {
+        "it is an image: `etendue info` tells what it holds, `etendue convert` makes another of it"
+    } else {
+        "a scene is an .xml file, a mesh a .ply, .obj, .stl, .serialized, .gltf or .glb"
+    }))
 }
