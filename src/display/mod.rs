@@ -247,7 +247,7 @@ impl DisplayTransform {
         };
         match (self.transfer, self.gamut) {
             (Transfer::Srgb, Gamut::Bt709) => Tag::Srgb,
-            (Transfer::Gamma(exponent), _) => Tag::Gamma(exponent),
+            (Transfer::Gamma(exponent), gamut) => Tag::Gamma(exponent, gamut.primaries()),
             (Transfer::Srgb, _) => Tag::Cicp {
                 primaries,
                 transfer: 13,
@@ -271,15 +271,18 @@ fn each(pixels: &mut [[f32; 3]], view: impl Fn([f32; 3]) -> [f32; 3] + Sync) {
 }
 
 impl Gamut {
-    /// From linear BT.709, unless it is that.
-    fn matrix(self) -> Option<DMat3> {
-        let primaries = match self {
-            Self::Bt709 => return None,
+    fn primaries(self) -> Primaries {
+        match self {
+            Self::Bt709 => Primaries::BT709,
             Self::P3 => Primaries::P3_D65,
             Self::Bt2020 => Primaries::BT2020,
-        };
+        }
+    }
+
+    /// From linear BT.709, unless it is that.
+    fn matrix(self) -> Option<DMat3> {
         let to_xyz = |primaries: Primaries| primaries.to_xyz().expect("they are a space");
-        Some(to_xyz(primaries).inverse() * to_xyz(Primaries::BT709))
+        (self != Self::Bt709).then(|| to_xyz(self.primaries()).inverse() * to_xyz(Primaries::BT709))
     }
 }
 

@@ -1,5 +1,6 @@
 use super::*;
 use crate::budget::Budget;
+use crate::color::Primaries;
 use crate::image::Encoding;
 
 /// The 8-bit codes of an image of one row.
@@ -226,7 +227,10 @@ fn codes_say_what_they_mean() {
         transfer,
     };
     assert_eq!(tag(Gamut::Bt709, Transfer::Srgb), Tag::Srgb);
-    assert_eq!(tag(Gamut::Bt709, Transfer::Gamma(2.2)), Tag::Gamma(2.2));
+    assert_eq!(
+        tag(Gamut::Bt709, Transfer::Gamma(2.2)),
+        Tag::Gamma(2.2, Primaries::BT709)
+    );
     assert_eq!(tag(Gamut::P3, Transfer::Srgb), cicp(12, 13));
     assert_eq!(tag(Gamut::Bt2020, Transfer::Pq), cicp(9, 16));
     assert_eq!(tag(Gamut::Bt2020, Transfer::Hlg), cicp(9, 18));

@@ -8,6 +8,7 @@ use ::image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use ::image::{ExtendedColorType, ImageEncoder};
 use libjpeg_turbo_rs::{Encoder, PixelFormat, Subsampling};
 
+use crate::color::Primaries;
 use crate::error::{Error, Result};
 use crate::file;
 use crate::image::format::Format;
@@ -38,13 +39,13 @@ impl Layout {
     }
 }
 
-/// What codes mean, for those who show them (PNG, third edition, 2025: sRGB, gAMA and cICP).
+/// What codes mean, for those who show them (PNG, third edition, 2025: sRGB, gAMA, cHRM and cICP).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Tag {
     /// The colour space sRGB.
     Srgb,
-    /// Primaries of BT.709, and codes that are light to the power of the inverse of this.
-    Gamma(f32),
+    /// Codes that are light of these primaries to the power of the inverse of this.
+    Gamma(f32, Primaries),
     /// Primaries and transfer characteristics by their numbers in ITU-T H.273.
     Cicp {
         /// Such as 1 for BT.709, 9 for BT.2020, 12 for P3 with white D65.
@@ -55,20 +56,34 @@ pub enum Tag {
 }
 
 impl Tag {
-    /// The chunk's name and data.
-    fn chunk(self) -> (&'static [u8; 4], Vec<u8>) {
+    /// The names and the data of the chunks that say it.
+    fn chunks(self) -> Vec<(&'static [u8; 4], Vec<u8>)> {
+        let parts = |numbers: &[f64]| -> Vec<u8> {
+            let part = |v: &f64| ((v * 100_000.0).round() as u32).to_be_bytes();
+            numbers.iter().flat_map(part).collect()
+        };
         match self {
             // As rendered colours mostly are meant: perceptually.
-            Self::Srgb => (b"sRGB", vec![0]),
-            Self::Gamma(exponent) => {
-                let part = (100_000.0 / exponent).round() as u32;
-                (b"gAMA", part.to_be_bytes().to_vec())
+            Self::Srgb => vec![(b"sRGB", vec![0])],
+            Self::Gamma(exponent, primaries) => {
+                let mut chunks = vec![(b"gAMA", parts(&[1.0 / f64::from(exponent)]))];
+                // Those of BT.709 are what is meant where nothing is said.
+                if !primaries.same(&Primaries::BT709) {
+                    let Primaries {
+                        red,
+                        green,
+                        blue,
+                        white,
+                    } = primaries;
+                    chunks.push((b"cHRM", parts(&[white, red, green, blue].concat())));
+                }
+                chunks
             }
             // RGB, of full range.
             Self::Cicp {
                 primaries,
                 transfer,
-            } => (b"cICP", vec![primaries, transfer, 0, 1]),
+            } => vec![(b"cICP", vec![primaries, transfer, 0, 1])],
         }
     }
 }
@@ -183,8 +198,9 @@ impl<T: Code> Codes<T> {
             )
             .map_err(|e| Error::input(format!("the image cannot be stored as PNG: {e}")))?;
         // It stands behind the header, which every file begins with: a signature of 8 bytes, and a chunk of 25.
-        let chunk = chunk(tag);
-        bytes.splice(33..33, chunk);
+        let chunks = tag.chunks();
+        let chunks = chunks.iter().flat_map(|(name, data)| chunk(name, data));
+        bytes.splice(33..33, chunks);
         Ok(bytes)
     }
 
@@ -223,9 +239,8 @@ impl<T: Code> Codes<T> {
 }
 
 /// A chunk of a PNG file: length, name, data and a check of the last two.
-fn chunk(tag: Tag) -> Vec<u8> {
-    let (name, data) = tag.chunk();
-    let checked = [&name[..], &data].concat();
+fn chunk(name: &[u8; 4], data: &[u8]) -> Vec<u8> {
+    let checked = [&name[..], data].concat();
     let check = crc32fast::hash(&checked);
     let length = data.len() as u32;
     [&length.to_be_bytes()[..], &checked, &check.to_be_bytes()].concat()

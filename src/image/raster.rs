@@ -1,13 +1,13 @@
 //! Pictures of integers by the crate `image`: PNG, BMP, TGA and PPM with its kin. They become code values in
 //! [0, 1] (v / 255 or v / 65535, not decoded). What else a PNG says of its colours (gAMA, cHRM, cICP, a
-//! profile) is not looked at, as in Mitsuba.
+//! profile) changes nothing, as in Mitsuba; codes of other displays than sRGB's (cICP) are told.
 
 use std::io::Cursor;
 
 use ::image::{ColorType, ImageDecoder, ImageError, ImageFormat, ImageReader};
 
 use crate::budget::Account;
-use crate::error::{Error, Result};
+use crate::error::{Error, Problem, Result};
 use crate::image::{Encoding, Image, Picture};
 
 /// Decodes the bytes of a file of this format.
@@ -40,8 +40,55 @@ pub(super) fn decode(bytes: &[u8], format: ImageFormat, account: &Account) -> Re
         image: Image::from_data(width, height, names, data)?,
         encoding: Encoding::Srgb,
         metadata: Vec::new(),
-        warnings: Vec::new(),
+        warnings: foreign(bytes, format),
     })
+}
+
+/// What to say of a PNG whose codes are another display's than sRGB's (ITU-T H.273; PNG, third edition, 2025).
+fn foreign(bytes: &[u8], format: ImageFormat) -> Vec<Problem> {
+    const BT709: u8 = 1;
+    const SRGB: u8 = 13;
+    let Some([primaries, transfer]) = cicp(bytes).filter(|_| format == ImageFormat::Png) else {
+        return Vec::new();
+    };
+    if (primaries, transfer) == (BT709, SRGB) {
+        return Vec::new();
+    }
+    let space = match primaries {
+        BT709 => "BT.709".to_owned(),
+        9 => "BT.2020".to_owned(),
+        12 => "P3".to_owned(),
+        other => format!("number {other}"),
+    };
+    let curve = match transfer {
+        SRGB => "sRGB".to_owned(),
+        16 => "PQ".to_owned(),
+        18 => "HLG".to_owned(),
+        other => format!("number {other}"),
+    };
+    let message = format!(
+        "the file says that its primaries are {space} and its curve is {curve} (cICP): it is read as sRGB"
+    );
+    let told = Error::input(message).help("keep linear values in an EXR file");
+    told.problems().to_vec()
+}
+
+/// The primaries and the curve that a PNG's cICP names, ahead of its pixels.
+fn cicp(png: &[u8]) -> Option<[u8; 2]> {
+    const SIGNATURE: usize = 8;
+    let mut rest = png.get(SIGNATURE..)?;
+    loop {
+        let (length, after) = rest.split_first_chunk::<4>()?;
+        let (kind, data) = after.split_first_chunk::<4>()?;
+        match kind {
+            b"cICP" => return Some([*data.first()?, *data.get(1)?]),
+            b"IDAT" => return None,
+            _ => {}
+        }
+        const CHECKSUM: usize = 4;
+        let length = u32::from_be_bytes(*length) as usize;
+        rest = data.get(length.checked_add(CHECKSUM)?..)?;
+    }
 }
 
 /// All that a decoder of the crate `image` makes.

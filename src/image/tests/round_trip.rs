@@ -7,6 +7,7 @@ use ::image::{ExtendedColorType, ImageFormat};
 use glam::Mat4;
 
 use super::*;
+use crate::color::Primaries;
 
 fn in_file<T>(name: &str, test: impl FnOnce(&Path) -> T) -> T {
     let folder = tempfile::tempdir().unwrap();
@@ -260,7 +261,7 @@ fn png_codes_come_back_unchanged() {
         let data: Vec<u16> = (0..n).map(|i| (i * 257 % 65_536) as u16).collect();
         let codes = Codes::new(16, 16, layout, data.clone()).unwrap();
         let back = in_file("a.png", |path| {
-            write_codes(path, &codes, Tag::Gamma(2.2)).unwrap();
+            write_codes(path, &codes, Tag::Gamma(2.2, Primaries::BT709)).unwrap();
             read(path, &Budget::default().open()).unwrap()
         });
         let values: Vec<f32> = data.iter().map(|&v| f32::from(v) / 65535.0).collect();
@@ -278,7 +279,15 @@ fn png_files_say_what_their_codes_mean() {
     };
     for (tag, expected) in [
         (Tag::Srgb, &b"\0\0\0\x01sRGB\0\xae\xce\x1c\xe9"[..]),
-        (Tag::Gamma(2.2), b"\0\0\0\x04gAMA\0\0\xb1\x8f"),
+        (
+            Tag::Gamma(2.2, Primaries::BT709),
+            b"\0\0\0\x04gAMA\0\0\xb1\x8f",
+        ),
+        // Behind a check of four bytes; the first is white's x, .3127.
+        (
+            Tag::Gamma(2.2, Primaries::P3_D65),
+            b"\0\0\0\x04gAMA\0\0\xb1\x8f\x0b\xfc\x61\x05\0\0\0\x20cHRM\0\0\x7a\x26",
+        ),
         (cicp, b"\0\0\0\x04cICP\x09\x10\0\x01"),
     ] {
         let bytes = in_file("a.png", |path| {
@@ -286,6 +295,14 @@ fn png_files_say_what_their_codes_mean() {
             std::fs::read(path).unwrap()
         });
         assert_eq!(&bytes[33..][..expected.len()], expected, "{tag:?}");
+        let read = decode(Path::new("a.png"), &bytes, &Budget::default().open()).unwrap();
+        let told = read.warnings.iter().map(|problem| problem.message.as_str());
+        let foreign = matches!(tag, Tag::Cicp { .. });
+        let expected = "the file says that its primaries are BT.2020 and its curve is PQ (cICP): it is read as sRGB";
+        assert_eq!(
+            told.collect::<Vec<_>>(),
+            vec![expected; usize::from(foreign)]
+        );
     }
 }
 
