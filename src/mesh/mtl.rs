@@ -38,8 +38,9 @@ pub(super) struct Materials {
     unseen: BTreeSet<&'static str>,
     /// Materials beyond [`MOST_MATERIALS`].
     left_out: usize,
-    /// Lines that do not say what they should.
+    /// Lines that do not say what they should, and where the first of them stands.
     unusable: usize,
+    first_unusable: Option<String>,
 }
 
 /// What is shown of a material.
@@ -48,6 +49,8 @@ struct Material {
     /// `None`: without a colour that can be shown.
     color: Option<[f32; 3]>,
     surface: Surface,
+    /// Whether `Tr` says that it is see-through: programs disagree on which way that counts.
+    has_tr: bool,
 }
 
 impl Materials {
@@ -77,7 +80,7 @@ impl Materials {
 
     /// The colour of the material called `name`; `None` where there is no such material or it has none.
     pub(super) fn color(&self, name: &[u8]) -> Option<[f32; 3]> {
-        let Material { color, surface } = self.materials.get(name)?;
+        let Material { color, surface, .. } = self.materials.get(name)?;
         // Many programs write no colour, or black, where an image has the say.
         let textured = surface.maps.color.is_some();
         match color {
@@ -107,7 +110,7 @@ impl Materials {
             ));
         } else {
             match bytes(&path) {
-                Ok(bytes) => self.parse(&bytes, path.parent().unwrap_or(Path::new(""))),
+                Ok(bytes) => self.parse(&bytes, &path),
                 Err(why) => self.warnings.push(format!(
                     "the material library {} cannot be read: {why}",
                     path.display()
@@ -117,9 +120,10 @@ impl Materials {
         self.libraries.push(path);
     }
 
-    fn parse(&mut self, bytes: &[u8], folder: &Path) {
+    fn parse(&mut self, bytes: &[u8], library: &Path) {
+        let folder = library.parent().unwrap_or(Path::new(""));
         let mut current = None;
-        for line in text::lines(bytes) {
+        for (number, line) in text::lines(bytes).enumerate() {
             let (keyword, rest) = keyword(line);
             let keyword = keyword.to_ascii_lowercase();
             if keyword == b"newmtl" {
@@ -127,6 +131,7 @@ impl Materials {
                 let empty = Material {
                     color: None,
                     surface: Surface::MATTE,
+                    has_tr: false,
                 };
                 current = Some((rest.to_vec(), empty));
                 continue;
@@ -145,7 +150,11 @@ impl Materials {
                 }
                 Some(())
             };
-            self.unusable += usize::from(understood.is_none());
+            if understood.is_none() {
+                self.unusable += 1;
+                let place = || format!("{}:{}", library.display(), number + 1);
+                self.first_unusable.get_or_insert_with(place);
+            }
         }
         self.keep(current);
     }
@@ -174,7 +183,10 @@ impl Materials {
         let number = || Some(color(rest)?[0]);
         let mut unplaced = None;
         let surface = match material {
-            Some(material) => &mut material.surface,
+            Some(material) => {
+                material.has_tr |= keyword == b"tr" && number()? > 0.0;
+                &mut material.surface
+            }
             None => unplaced.insert(Surface::MATTE),
         };
         let maps = &mut surface.maps;
@@ -200,6 +212,9 @@ impl Materials {
             return;
         };
         material.complete();
+        if material.has_tr && material.surface.opacity == 1.0 {
+            self.unseen.insert("Tr (write d)");
+        }
         if self.materials.len() < MOST_MATERIALS {
             self.materials.entry(name).or_insert(material);
         } else if !self.materials.contains_key(&name) {
@@ -214,19 +229,19 @@ impl Materials {
             self.warnings
                 .push(format!("not shown of the materials: {names}"));
         }
-        for (count, what) in [
-            (
-                self.unusable,
-                "lines passed over: wanted is a material's one or three numbers from 0 to 1, or an image",
-            ),
-            (
-                self.left_out,
-                "materials left out: a mesh can have 65536 of them",
-            ),
-        ] {
-            if count > 0 {
-                self.warnings.push(format!("{count} {what}"));
-            }
+        if let Some(place) = &self.first_unusable {
+            let lines = match self.unusable {
+                1 => "1 line".to_owned(),
+                many => format!("{many} lines"),
+            };
+            self.warnings.push(format!(
+                "{lines} of material libraries passed over, the first at {place}: wanted is a material's one or three \
+                 numbers from 0 to 1, or an image"
+            ));
+        }
+        if self.left_out > 0 {
+            let message = "materials left out: a mesh can have 65536 of them";
+            self.warnings.push(format!("{} {message}", self.left_out));
         }
     }
 }
@@ -377,7 +392,7 @@ mod tests {
             whole: true,
             ..Materials::default()
         };
-        materials.parse(text, Path::new("there"));
+        materials.parse(text, Path::new("there/a.mtl"));
         materials.summarize();
         materials
     }
@@ -442,6 +457,20 @@ mod tests {
             let materials = parse(format!("newmtl a\n{broken}\n").as_bytes());
             assert_eq!(materials.warnings.len(), 1, "{broken}");
             assert_eq!(materials.surface(b"a"), Surface::MATTE, "{broken}");
+        }
+    }
+
+    #[test]
+    fn what_tr_says_is_told_where_nothing_else_says_it() {
+        let told = ["not shown of the materials: Tr (write d)"];
+        for (text, warnings) in [
+            ("Tr 0.5", &told[..]),
+            ("Tr 0", &[]),
+            ("Tr 0.5\nd 0.5", &[]),
+            ("d 0.5\nTr 0.5", &[]),
+        ] {
+            let materials = parse(format!("newmtl a\n{text}\n").as_bytes());
+            assert_eq!(materials.warnings, warnings, "{text}");
         }
     }
 

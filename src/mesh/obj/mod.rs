@@ -469,7 +469,8 @@ mod tests {
         let loaded = with_libraries("newmtl green\nKd 0 1 0\n", "newmtl red\nKd so red\n");
         assert!(loaded.mesh.attributes.is_empty());
         let said: Vec<_> = loaded.warnings.iter().map(|w| w.to_string()).collect();
-        assert!(said[1].contains("1 lines passed over"), "{said:?}");
+        let place = "1 line of material libraries passed over, the first at ";
+        assert!(said[1].contains(place), "{said:?}");
         assert!(said[2].contains("no library has the material"), "{said:?}");
         assert!(said[2].contains("dark blue"), "{said:?}");
     }
