@@ -36,8 +36,8 @@ pub(super) struct StagingArguments {
     /// lights (glTF, in candela and lux: a radiance of 1 is 1 cd/m²) and nothing else, or else the studio
     #[arg(long, default_value = "auto", value_name = "NAME|IMAGE", value_parser = lighting, help_heading = BARE)]
     light: Lighting,
-    /// What is seen beside it: "sky", or in place of that a radiance such as 1,1,1 or an image of all around, which light it
-    /// too; or "transparent", which leaves out the ground too
+    /// What is seen beside it: "sky", or in place of sky and ground a radiance such as 1,1,1 or an image of all around, which
+    /// light it too, or nothing ("transparent")
     #[arg(long, default_value = "sky", value_name = "R,G,B|IMAGE|transparent", value_parser = background, help_heading = BARE)]
     background: Background,
     /// Let it float

@@ -76,7 +76,7 @@ pub enum Lighting {
     Environment(PathBuf),
 }
 
-/// What is seen beside a bare mesh.
+/// What is seen beside a bare mesh; all but the sky leave out the ground.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Background {
     /// The sky that lights it.
@@ -86,7 +86,7 @@ pub enum Background {
     Color([f32; 3]),
     /// In place of the sky, an image of all around by longitude and latitude.
     Environment(PathBuf),
-    /// Nothing: the image has opacity, and there is no ground.
+    /// Nothing: the image has opacity.
     Transparent,
 }
 
@@ -156,10 +156,10 @@ impl Staging {
         angles.iter().any(Option::is_some) || self.target.is_some()
     }
 
-    /// Whether there is a ground: from below it would be all that is seen.
+    /// Whether there is a ground: from below it would be all that is seen, and mostly it hides any background.
     pub(super) fn has_ground(&self) -> bool {
         let is_below = self.elevation.is_some_and(|elevation| elevation < 0.0);
-        self.ground && !is_below && self.background != Background::Transparent
+        self.ground && !is_below && self.background == Background::Sky
     }
 
     /// The scene file of the mesh's material, and that material, where it comes from a file. `options` and `budget` are for
