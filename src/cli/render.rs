@@ -8,11 +8,12 @@ use etendue::accel::{Build, Method};
 use etendue::budget::Budget;
 use etendue::compare::map::{Map, Scale, robust_top};
 use etendue::denoise::Denoiser;
-use etendue::description::{self, Description, Kind, Value};
+use etendue::description::{self, Description};
 use etendue::display;
 use etendue::error::{Error, Problem, Result};
 use etendue::image;
 use etendue::lanes::Kernel;
+use etendue::mesh::{GltfAnimation, read_gltf_animation};
 use etendue::render::{
     Adaptive, Checkpoint, Options, Outline, Overrides, Passes, Picture, Progress, Rendered,
     Session, Staging, is_current, is_mesh, is_part, outline, sensors,
@@ -24,6 +25,7 @@ use super::denoise::{self, DenoiseArguments};
 use super::display::DisplayArguments;
 use super::images::{Images, Item, Request};
 use super::memory::{RUN, RunArguments};
+use super::output::Names;
 use super::overrides::{IMAGE, ImageArguments};
 use super::parse::{self, Frames};
 use super::progress::{self, Take, Takers, Told, Voice, Watch};
@@ -595,16 +597,6 @@ impl<'a> Series<'a> {
             let posed = posed.get_or_insert_with(|| description.clone());
             eye.place(posed, sensor, distance)?;
         }
-        if let Some(times) = self.moments(item, shutter)? {
-            let posed = posed.get_or_insert_with(|| description.clone());
-            let root = posed.root().node_id();
-            let shapes = posed.children_of(root, Kind::Shape);
-            for shape in shapes {
-                if posed.node(shape).plugin() == "gltf" {
-                    posed.set(shape, "times", Value::String(times.clone()));
-                }
-            }
-        }
         Ok(posed)
     }
 
@@ -645,27 +637,17 @@ impl<'a> Series<'a> {
         Ok(Ending::NotBegun)
     }
 
-    /// When a bare glTF file's animation is looked at, as `times` are written; `None` where it has none, or nobody asks
-    /// for a time.
-    fn moments(&self, item: &Item, shutter: Option<(f64, f64)>) -> Result<Option<String>> {
-        /// Sets of vertices while a shutter is open.
-        const SETS: usize = 5;
+    /// When a bare glTF file's animation is looked at; `None` where it has none, or nobody asks for a time.
+    fn animation(&self, item: &Item) -> Result<Option<GltfAnimation>> {
+        let shutter = self.arguments.image.shutter(item.frame.unwrap_or(0));
         let extension = etendue::mesh::extension(&item.input);
         let asked = item.frame.is_some() && self.arguments.turntable.is_none() || shutter.is_some();
         if !asked || !matches!(extension.as_str(), "gltf" | "glb") {
             return Ok(None);
         }
-        if !etendue::mesh::gltf_is_animated(&item.input, &self.budget)? {
-            return Ok(None);
-        }
         let time = item.frame.unwrap_or(0) as f64 / self.arguments.image.fps();
         let (open, close) = shutter.unwrap_or((time, time));
-        let at = |set: usize| (open + (close - open) * set as f64 / (SETS - 1) as f64) as f32;
-        let times: Vec<f32> = (0..SETS).map(at).collect();
-        let ascend = times.windows(2).all(|pair| pair[0] < pair[1]);
-        let times = if ascend { &times[..] } else { &times[..1] };
-        let texts: Vec<String> = times.iter().map(f32::to_string).collect();
-        Ok(Some(texts.join(", ")))
+        read_gltf_animation(&item.input, [open as f32, close as f32], &self.budget)
     }
 
     /// Draws the picture of node steps, unless stopped.
@@ -699,26 +681,32 @@ impl<'a> Series<'a> {
         // A bare mesh has no parameters, and reading it takes time.
         let bare = is_mesh(&item.input);
         let options = scene.options(item.frame.filter(|_| !bare));
+        let animation = self.animation(item)?;
+        // What moves is another scene at any other time.
         if let Some((input, as_read, description)) = self.read.take()
             && input == item.input
             && as_read == options
+            && animation.is_none()
         {
             return Ok((options, description));
         }
         let turns = self.arguments.turntable.is_some();
-        let shutter = self.arguments.image.shutter(item.frame.unwrap_or(0));
-        let deforms = self
-            .moments(item, shutter)?
-            .is_some_and(|times| times.contains(','));
         let (arguments, up) = (&self.arguments.staging, scene.up_axis());
         let staging = Staging {
-            deforms,
+            animation,
             ..arguments.staging(up, &self.arguments.image.overrides(), turns)
         };
         let (budget, session) = (&self.budget, &mut self.session);
         let (mut description, text) = describe(&item.input, &staging, &options, budget, session)?;
         if let (Some(path), Some(text)) = (&arguments.write_scene, text) {
-            etendue::file::write_atomically(path, text.as_bytes())?;
+            let names = Names {
+                input: &item.input,
+                frame: item.frame.unwrap_or(0),
+                sensor: "0",
+                eye: None,
+            };
+            let path = names.expand(&path.to_string_lossy())?;
+            etendue::file::write_atomically(&path, text.as_bytes())?;
         }
         self.arguments.overrides().apply(&mut description);
         Ok((options, description))

@@ -87,7 +87,7 @@ impl StagingArguments {
             lighting: self.light.clone(),
             background: self.background.clone(),
             ground: !self.no_ground,
-            deforms: false,
+            animation: None,
         }
     }
 }

@@ -41,8 +41,8 @@ pub use generate::{
     menger, menger_triangles, rectangle, sphere, terrain,
 };
 pub use gltf::{
-    GltfCamera, GltfLight, GltfLightKind, GltfPart, GltfScene, GltfSetting, Projection, gltf_image,
-    gltf_is_animated, read_gltf, read_gltf_setting,
+    GltfAnimation, GltfCamera, GltfLight, GltfLightKind, GltfPart, GltfScene, GltfSetting,
+    Projection, gltf_image, read_gltf, read_gltf_animation, read_gltf_settings,
 };
 pub use mtl::BARE_COLOR;
 pub use parts::{Part, Parts, read_parts};

@@ -31,6 +31,7 @@ use super::{Attribute, Mesh, Per};
 use crate::budget::{Account, Budget};
 use crate::error::{Error, Location, Problem, Result};
 use accessor::Accessors;
+pub use animation::GltfAnimation;
 use container::{Buffers, Container};
 use image::Textures;
 pub use image::gltf_image;
@@ -172,26 +173,78 @@ pub fn read_gltf(path: &Path, options: &ReadOptions, account: &Account) -> Resul
     Ok(scene)
 }
 
-/// The first camera and the lights of the default scene of the glTF or GLB file `path`, at rest; no mesh is read for them.
+/// The first camera and the lights of the default scene of the glTF or GLB file `path` at each of these times of its first
+/// animation, in seconds, or once at rest where there are none; no mesh is read for them.
 ///
 /// # Errors
-/// Where the file cannot be read or is malformed.
-pub fn read_gltf_setting(path: &Path, budget: &Budget) -> Result<GltfSetting> {
-    let account = budget.open();
-    let bytes = with_input(path, &account, |input| input.bytes())?;
-    let setting = || -> OrWhy<GltfSetting> {
-        let json = Container::open(&bytes)?.json;
-        take_tree(json, &account)?;
-        let root = Root::parse(json)?;
-        let stage = Stage::set(&root, &mut Notes::default())?;
-        let mut notes = Notes::default();
-        Ok(GltfSetting {
-            camera: stage.camera,
-            lights: lights::placed(&root, &stage, &mut notes)?,
-            warnings: warnings(path, notes.told()),
-        })
+/// Where the file or a buffer that it names cannot be read or is malformed.
+pub fn read_gltf_settings(path: &Path, times: &[f32], budget: &Budget) -> Result<Vec<GltfSetting>> {
+    with_accessors(path, budget, !times.is_empty(), |json, accessors| {
+        let changes = times
+            .iter()
+            .map(|time| animation::changes(accessors, *time));
+        let mut changes = changes.collect::<OrWhy<Vec<_>>>()?;
+        if times.is_empty() {
+            changes.push(Vec::new());
+        }
+        let at_times = changes.into_iter().map(|changes| {
+            let mut root = Root::parse(json)?;
+            root.apply(changes);
+            let stage = Stage::set(&root, &mut Notes::default())?;
+            let mut notes = Notes::default();
+            Ok(GltfSetting {
+                camera: stage.camera,
+                lights: lights::placed(&root, &stage, &mut notes)?,
+                warnings: warnings(path, notes.told()),
+            })
+        });
+        at_times.collect()
+    })
+}
+
+/// When to look at the first animation of the glTF or GLB file `path` from when a shutter opens to when it closes; `None`
+/// where there is none. No mesh is read for it.
+///
+/// # Errors
+/// As [`read_gltf_settings`].
+pub fn read_gltf_animation(
+    path: &Path,
+    shutter: [f32; 2],
+    budget: &Budget,
+) -> Result<Option<GltfAnimation>> {
+    with_accessors(path, budget, true, |_, accessors| {
+        if accessors.root.animations.is_empty() {
+            return Ok(None);
+        }
+        animation::moments(accessors, shutter).map(Some)
+    })
+}
+
+/// Opens a file for what it says beside its meshes, with its buffers only where it moves; `work` gets its JSON text too.
+fn with_accessors<T>(
+    path: &Path,
+    budget: &Budget,
+    moves: bool,
+    work: impl FnOnce(&[u8], &Accessors<'_>) -> OrWhy<T>,
+) -> Result<T> {
+    let account = &budget.open();
+    let bytes = with_input(path, account, |input| input.bytes())?;
+    let done = || -> OrWhy<T> {
+        let Container { json, binary } = Container::open(&bytes)?;
+        take_tree(json, account)?;
+        let mut root = Root::parse(json)?;
+        if !moves {
+            root.buffers.clear();
+        }
+        let (root, buffers) = (&root, &Buffers::load(&root, binary, path, account));
+        let accessors = Accessors {
+            root,
+            buffers,
+            account,
+        };
+        work(json, &accessors)
     };
-    setting().map_err(|why| Error::input(why).at(&Location::of_file(path)))
+    done().map_err(|why| Error::input(why).at(&Location::of_file(path)))
 }
 
 /// Asks for the memory of a JSON text's objects and numbers.
@@ -201,21 +254,6 @@ fn take_tree(json: &[u8], account: &Account) -> OrWhy<()> {
     let count = |wanted: u8| json.iter().filter(|byte| **byte == wanted).count();
     let bytes = count(b'{') * OBJECT + count(b',') * MEMBER;
     account.take(bytes as u64).map_err(|e| e.to_string())
-}
-
-/// Whether the glTF or GLB file `path` has an animation; no mesh is read for it.
-///
-/// # Errors
-/// Where the file cannot be read, is malformed or larger than the budget allows.
-pub fn gltf_is_animated(path: &Path, budget: &Budget) -> Result<bool> {
-    let account = budget.open();
-    let bytes = with_input(path, &account, |input| input.bytes())?;
-    let animated = || -> OrWhy<bool> {
-        let container = Container::open(&bytes)?;
-        take_tree(container.json, &account)?;
-        Ok(!Root::parse(container.json)?.animations.is_empty())
-    };
-    animated().map_err(|why| Error::input(why).at(&Location::of_file(path)))
 }
 
 /// All parts as one mesh, with their colours, and with the rest of their materials where the file is all there is.
@@ -362,7 +400,7 @@ fn walk(input: Input<'_>, options: &ReadOptions, look: Look) -> Result<Walk> {
             }
         }
         if !root.animations.is_empty() && options.time.is_none() {
-            (walk.notes).add("animations are left out: nodes and weights stand at rest");
+            (walk.notes).add("animations are left out: nodes and weights stand at rest (`etendue render` shows them by --frames and --shutter)");
         }
         let accessors = Accessors {
             root: &root,

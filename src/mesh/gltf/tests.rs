@@ -576,7 +576,7 @@ fn each_kind_of_thing_that_is_left_out_is_told_once() {
         {"camera": 0, "extensions": {"KHR_lights_punctual": {"light": 0}}},
         {"camera": 0, "extensions": {"KHR_lights_punctual": {"light": 0}}}]);
     let expected = [
-        "animations are left out: nodes and weights stand at rest",
+        "animations are left out: nodes and weights stand at rest (`etendue render` shows them by --frames and --shutter)",
         "cameras after the first are left out",
         "lights are left out (KHR_lights_punctual) (2 times)",
         "materials are shown by their base colour factor alone, without KHR_materials_unlit, emission, textures, \

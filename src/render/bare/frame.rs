@@ -3,7 +3,6 @@
 use glam::{DVec3, Vec3};
 
 use super::staging::Staging;
-use crate::mesh::Mesh;
 
 /// The film's part that the mesh may fill.
 const FILLED: f64 = 0.92;
@@ -27,11 +26,13 @@ pub(super) struct Pose {
     pub(super) front: Vec3,
 }
 
-/// Frames the mesh, whose triangles lie between `min` and `max`.
-pub(super) fn pose(mesh: &Mesh, (min, max): (Vec3, Vec3), staging: &Staging) -> Pose {
+/// Frames those of some points that lie between `min` and `max`.
+pub(super) fn pose(points: &[Vec3], (min, max): (Vec3, Vec3), staging: &Staging) -> Pose {
     let (center, radius) = ball(min, max);
     // Vertices of no triangle may lie anywhere.
-    let vertices = (mesh.positions.iter()).filter(|p| p.cmpge(min).all() && p.cmple(max).all());
+    let vertices = points
+        .iter()
+        .filter(|p| p.cmpge(min).all() && p.cmple(max).all());
     let up = staging.up.direction().as_dvec3();
     let (front, right) = (staging.up.front().as_dvec3(), DVec3::X);
     let azimuth = f64::from(staging.azimuth.unwrap_or(AZIMUTH)).to_radians();
@@ -114,6 +115,7 @@ fn tight(points: impl Iterator<Item = [f64; 3]>, tangents: [f64; 2]) -> ([f64; 2
 mod tests {
     use super::*;
     use crate::math::random;
+    use crate::mesh::Mesh;
 
     fn cloud(stretch: Vec3) -> Mesh {
         let number = |i: u32| random::unit(random::bits(3, i)) - 0.5;
@@ -179,7 +181,7 @@ mod tests {
                     };
                     let points = seen(
                         &mesh,
-                        &pose(&mesh, mesh.bounds().unwrap(), &staging),
+                        &pose(&mesh.positions, mesh.bounds().unwrap(), &staging),
                         &staging,
                     );
                     let least =
@@ -209,7 +211,7 @@ mod tests {
             target: Some(target),
             ..Staging::default()
         };
-        let near = pose(&mesh, mesh.bounds().unwrap(), &staging);
+        let near = pose(&mesh.positions, mesh.bounds().unwrap(), &staging);
         assert!(near.target.distance(target) < 1e-9, "{near:?}");
         let points = seen(&mesh, &near, &staging);
         let most = points
@@ -218,7 +220,7 @@ mod tests {
             .fold(0.0_f64, |most, v| most.max(v.abs()));
         assert!((most - FILLED).abs() < 1e-3, "{most}");
         staging.distance = Some(2.0);
-        let far = pose(&mesh, mesh.bounds().unwrap(), &staging);
+        let far = pose(&mesh.positions, mesh.bounds().unwrap(), &staging);
         let ratio = far.eye.distance(target) / near.eye.distance(target);
         assert!((ratio - 2.0).abs() < 1e-9, "{ratio}");
     }

@@ -5,37 +5,57 @@
 use std::f64::consts::PI;
 use std::fmt::Write as _;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use crate::mesh::{GltfLight, GltfLightKind};
 
-/// The lights as a scene file says them.
-pub(super) fn emitters(lights: &[GltfLight]) -> String {
+/// A light's position, direction, and an axis beside that.
+type Place = [DVec3; 3];
+
+/// The lights at some `moments`, or once where there are none, as a scene file says them.
+pub(super) fn emitters(lights: &[Vec<GltfLight>], moments: &[f32]) -> String {
     let mut text = String::new();
-    for light in lights {
+    for (number, light) in lights[0].iter().enumerate() {
         let [r, g, b] = light.intensity;
-        let (p, d) = (light.position, light.direction);
+        let (mut places, mut beside) = (
+            Vec::<Place>::new(),
+            light.direction.any_orthonormal_vector(),
+        );
+        for light in lights.iter().filter_map(|lights| lights.get(number)) {
+            let (at, d) = (light.position, light.direction);
+            // Turned no more than the direction is.
+            let turned = beside.reject_from_normalized(d).try_normalize();
+            beside = turned.unwrap_or_else(|| d.any_orthonormal_vector());
+            places.push([at, d, beside]);
+        }
+        let to_world = |one: fn(&Place) -> String| placed(&places, moments, one);
         let _ = match light.kind {
-            GltfLightKind::Point => write!(
-                text,
-                r#"
+            GltfLightKind::Point => {
+                let to_world = to_world(|[at, ..]| {
+                    format!(r#"<translate x="{}" y="{}" z="{}"/>"#, at.x, at.y, at.z)
+                });
+                write!(
+                    text,
+                    r#"
     <emitter type="point">
-        <point name="position" value="{}, {}, {}"/>
         <rgb name="intensity" value="{r}, {g}, {b}"/>
-    </emitter>"#,
-                p.x, p.y, p.z
-            ),
-            GltfLightKind::Directional => write!(
-                text,
-                r#"
+        {to_world}
+    </emitter>"#
+                )
+            }
+            GltfLightKind::Directional => {
+                let to_world = to_world(|[_, d, beside]| lookat(DVec3::ZERO, *d, *beside));
+                write!(
+                    text,
+                    r#"
     <emitter type="directional">
-        <vector name="direction" value="{}, {}, {}"/>
         <rgb name="irradiance" value="{r}, {g}, {b}"/>
-    </emitter>"#,
-                d.x, d.y, d.z
-            ),
+        {to_world}
+    </emitter>"#
+                )
+            }
             GltfLightKind::Spot { inner, outer } => {
-                let (target, up) = (p + d, d.any_orthonormal_vector());
+                let to_world = to_world(|[at, d, beside]| lookat(*at, *at + *d, *beside));
                 // A beam as wide as the cutoff would have no edge to fade along.
                 let beam = inner.min(0.999 * outer).to_degrees();
                 write!(
@@ -45,25 +65,37 @@ pub(super) fn emitters(lights: &[GltfLight]) -> String {
         <rgb name="intensity" value="{r}, {g}, {b}"/>
         <float name="cutoff_angle" value="{}"/>
         <float name="beam_width" value="{beam}"/>
-        <transform name="to_world">
-            <lookat origin="{}, {}, {}" target="{}, {}, {}" up="{}, {}, {}"/>
-        </transform>
+        {to_world}
     </emitter>"#,
-                    outer.to_degrees(),
-                    p.x,
-                    p.y,
-                    p.z,
-                    target.x,
-                    target.y,
-                    target.z,
-                    up.x,
-                    up.y,
-                    up.z
+                    outer.to_degrees()
                 )
             }
         };
     }
     text
+}
+
+fn lookat(origin: DVec3, target: DVec3, up: DVec3) -> String {
+    let [origin, target, up] = [origin, target, up].map(|p| format!("{}, {}, {}", p.x, p.y, p.z));
+    format!(r#"<lookat origin="{origin}" target="{target}" up="{up}"/>"#)
+}
+
+/// The property `to_world` of what stands in `places` at some `moments`: `one` says one of them.
+pub(super) fn placed<P: PartialEq>(
+    places: &[P],
+    moments: &[f32],
+    one: impl Fn(&P) -> String,
+) -> String {
+    let first = &places[0];
+    if places.iter().all(|place| place == first) {
+        return format!(r#"<transform name="to_world">{}</transform>"#, one(first));
+    }
+    let keyframes = moments
+        .iter()
+        .zip(places)
+        .map(|(time, place)| format!(r#"<transform time="{time}">{}</transform>"#, one(place)));
+    let keyframes: String = keyframes.collect();
+    format!(r#"<animation name="to_world">{keyframes}</animation>"#)
 }
 
 /// What to say where white paper in the middle of the mesh would be far darker or brighter than a picture's white.

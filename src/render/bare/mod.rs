@@ -17,9 +17,10 @@ use crate::budget::Budget;
 use crate::description::{Description, Kind, Options, escaped};
 use crate::error::{Error, Location, Result};
 use crate::mesh::{
-    Attribute, GltfCamera, GltfLight, GltfSetting, Mesh, MeshFile, Projection, ReadMesh,
-    ReadOptions, extension, read, read_gltf_setting,
+    Attribute, GltfAnimation, GltfCamera, GltfLight, GltfSetting, Mesh, MeshFile, Projection,
+    ReadMesh, ReadOptions, Time, extension, read, read_gltf_settings,
 };
+use crate::shape::Bounds;
 use frame::FOV;
 use staging::point;
 use surface::Body;
@@ -74,9 +75,13 @@ pub fn describe_mesh(
             path.display()
         )));
     };
-    let read_options = ReadOptions::BARE;
+    let at = |time: Option<f32>| ReadOptions {
+        time: time.map(Time::of),
+        ..ReadOptions::BARE
+    };
+    let read_options = at(staging.moments().first().copied());
     let mut loaded = read(path, &read_options, budget)?;
-    let Some(bounds) = loaded.mesh.bounds() else {
+    let Some(mut bounds) = loaded.mesh.bounds() else {
         let error = match loaded.dropped_triangles {
             0 => Error::input("the file holds no triangle")
                 .help("a mesh has faces; points and lines alone are not drawn"),
@@ -87,6 +92,15 @@ pub fn describe_mesh(
         };
         return Err(error.at(&Location::of_file(path)));
     };
+    // A camera that sees all of an animation stands still from one image to the next.
+    let mut corners = Vec::new();
+    for time in staging.animation.iter().flat_map(looks) {
+        let looked_at = read(path, &at(Some(time)), budget)?.mesh;
+        if let Some((min, max)) = looked_at.bounds() {
+            bounds = (bounds.0.min(min), bounds.1.max(max));
+            corners.extend(Bounds { min, max }.corners());
+        }
+    }
     if !has_area(&loaded.mesh) {
         let message = "none of the triangles has an area: there is nothing to see";
         return Err(Error::input(message).at(&Location::of_file(path)));
@@ -119,21 +133,23 @@ pub fn describe_mesh(
         let warning = Error::input(message).at(&Location::of_file(path));
         loaded.warnings.extend_from_slice(warning.problems());
     }
-    let GltfSetting {
-        camera,
-        mut lights,
-        warnings,
-    } = match plugin {
-        "gltf" => read_gltf_setting(path, budget)?,
-        _ => GltfSetting::default(),
+    let settings = match plugin {
+        "gltf" => read_gltf_settings(path, staging.moments(), budget)?,
+        _ => vec![GltfSetting::default()],
     };
-    let camera = camera.filter(|_| !staging.asks_for_camera());
+    let (mut cameras, mut lights, mut warnings) = (Vec::new(), Vec::new(), Vec::new());
+    for setting in settings {
+        cameras.extend(setting.camera.filter(|_| !staging.asks_for_camera()));
+        lights.push(setting.lights);
+        warnings = setting.warnings;
+    }
     let said = if staging.lighting == Lighting::Auto {
         loaded.warnings.extend(warnings);
         let (center, radius) = frame::ball(bounds.0, bounds.1);
-        (!lights.is_empty()).then(|| lights::warning(&lights, center, radius))
+        (!lights[0].is_empty()).then(|| lights::warning(&lights[0], center, radius))
     } else {
-        let left = std::mem::take(&mut lights).len();
+        let left = lights[0].len();
+        lights.clear();
         (left > 0).then(|| Some(format!("the file's own lights ({left}) are left out")))
     };
     if let Some(message) = said.flatten() {
@@ -152,9 +168,13 @@ pub fn describe_mesh(
     let mut subject = Subject {
         plugin,
         bounds,
-        camera: camera.and_then(|camera| own_camera(&camera, staging.aspect())),
+        camera: own_camera(&cameras, staging.aspect()),
         lights: &lights,
         mesh: &loaded.mesh,
+        framed: match &corners[..] {
+            [] => &loaded.mesh.positions,
+            corners => corners,
+        },
         bodies: surface::bodies(&loaded, &surfaces),
         integrator: surface::integrator(&surfaces),
         staging,
@@ -211,9 +231,11 @@ struct Subject<'a> {
     plugin: &'static str,
     bounds: (Vec3, Vec3),
     camera: Option<OwnCamera>,
-    /// That light it, in place of what else there is.
-    lights: &'a [GltfLight],
+    /// That light it at each moment, in place of what else there is.
+    lights: &'a [Vec<GltfLight>],
     mesh: &'a Mesh,
+    /// What the camera is to see.
+    framed: &'a [Vec3],
     /// What of it is made of what; one at least.
     bodies: Vec<Body>,
     integrator: &'static str,
@@ -222,8 +244,8 @@ struct Subject<'a> {
 
 /// A camera that comes with the file.
 struct OwnCamera {
-    /// From Mitsuba's camera space.
-    to_world: DMat4,
+    /// From Mitsuba's camera space, at each moment.
+    to_world: Vec<DMat4>,
     /// The vertical angle of view, in degrees; `None`: its rays are parallel.
     fov_y: Option<f64>,
     near: f64,
@@ -231,29 +253,44 @@ struct OwnCamera {
     far: Option<f64>,
 }
 
-/// A camera as a scene file says it, of a film of this width over its height; `None` where it sees nothing.
-fn own_camera(camera: &GltfCamera, aspect: f64) -> Option<OwnCamera> {
+/// A camera at each moment as a scene file says it, of a film of this width over its height; `None` where there is none or it
+/// sees nothing.
+fn own_camera(cameras: &[GltfCamera], aspect: f64) -> Option<OwnCamera> {
+    let GltfCamera {
+        near,
+        far,
+        projection,
+        ..
+    } = *cameras.first()?;
     // Mitsuba's camera looks along +z with +x to the left: half a turn around y.
-    let to_world = camera.to_world * DMat4::from_scale(DVec3::new(-1.0, 1.0, -1.0));
-    let GltfCamera { near, far, .. } = *camera;
-    let (to_world, fov_y) = match camera.projection {
+    let turn = DMat4::from_scale(DVec3::new(-1.0, 1.0, -1.0));
+    let (scale, fov_y) = match projection {
         Projection::Perspective { fov_y, .. } if fov_y > 0.0 && fov_y < std::f64::consts::PI => {
-            (to_world, Some(fov_y.to_degrees()))
+            (DMat4::IDENTITY, Some(fov_y.to_degrees()))
         }
         // The film's width is 2 in the units of `to_world`.
         Projection::Orthographic { half_height, .. } if half_height > 0.0 => {
             let half_width = half_height * aspect;
             let scale = DVec3::new(half_width, half_width, 1.0);
-            (to_world * DMat4::from_scale(scale), None)
+            (DMat4::from_scale(scale), None)
         }
         _ => return None,
     };
+    let to_world = cameras.iter().map(|camera| camera.to_world * turn * scale);
     Some(OwnCamera {
-        to_world,
+        to_world: to_world.collect(),
         fov_y,
         near,
         far,
     })
+}
+
+/// Times of an animation at which it is looked at to frame it: its moments' ends, and evenly over all of it.
+fn looks(animation: &GltfAnimation) -> Vec<f32> {
+    const LOOKS: u8 = 5;
+    let [first, last] = animation.span;
+    let even = (0..LOOKS).map(|i| first + (last - first) * f32::from(i) / f32::from(LOOKS - 1));
+    even.chain(animation.moments.last().copied()).collect()
 }
 
 /// Whether a triangle can be seen from somewhere.
@@ -294,13 +331,13 @@ fn color(mesh: &Mesh, name: &str) -> Option<String> {
 fn scene(subject: &Subject<'_>, file: &Path, bare: bool) -> String {
     let Subject {
         bounds: (min, max),
-        mesh,
+        framed,
         staging,
         ..
     } = *subject;
     let (center, radius) = frame::ball(min, max);
     let up = staging.up.direction();
-    let pose = frame::pose(mesh, (min, max), staging);
+    let pose = frame::pose(framed, (min, max), staging);
     let distance = pose.eye.distance(pose.target);
     let [mut near, mut far] = [distance * 1e-3, (distance + f64::from(radius)) * 100.0];
     let field = |fov: f64, axis: &str| {
@@ -315,14 +352,15 @@ fn scene(subject: &Subject<'_>, file: &Path, bare: bool) -> String {
             // It sees nothing nearer than where it stands.
             near = camera.near.max(1e-6 * distance);
             far = camera.far.unwrap_or(far.max(1e6 * near));
-            let rows = camera.to_world.transpose().to_cols_array();
-            let matrix = format!(
-                r#"<matrix value="{}"/>"#,
-                rows.map(|v| v.to_string()).join(" ")
-            );
+            let matrix = |to_world: &DMat4| {
+                let rows = to_world.transpose().to_cols_array();
+                let rows = rows.map(|v| v.to_string()).join(" ");
+                format!(r#"<matrix value="{rows}"/>"#)
+            };
+            let to_world = lights::placed(&camera.to_world, staging.moments(), matrix);
             match camera.fov_y {
-                Some(fov) => ("perspective", field(fov, "y"), matrix),
-                None => ("orthographic", String::new(), matrix),
+                Some(fov) => ("perspective", field(fov, "y"), to_world),
+                None => ("orthographic", String::new(), to_world),
             }
         }
         None => {
@@ -330,7 +368,8 @@ fn scene(subject: &Subject<'_>, file: &Path, bare: bool) -> String {
                 [pose.eye, pose.target, pose.up].map(|p| format!("{}, {}, {}", p.x, p.y, p.z));
             let lookat = format!(r#"<lookat origin="{eye}" target="{target}" up="{upright}"/>"#);
             let fov = staging.fov.unwrap_or(FOV).into();
-            ("perspective", field(fov, "smaller"), lookat)
+            let to_world = format!(r#"<transform name="to_world">{lookat}</transform>"#);
+            ("perspective", field(fov, "smaller"), to_world)
         }
     };
     let hidden = match &staging.background {
@@ -340,6 +379,14 @@ fn scene(subject: &Subject<'_>, file: &Path, bare: bool) -> String {
     let pixels = match &staging.background {
         Background::Transparent => r#"<string name="pixel_format" value="rgba"/>"#,
         Background::Sky | Background::Color(_) | Background::Environment(_) => "",
+    };
+    let shutter = match staging.moments() {
+        [open, .., close] => format!(
+            r#"
+        <float name="shutter_open" value="{open}"/>
+        <float name="shutter_close" value="{close}"/>"#
+        ),
+        _ => String::new(),
     };
     let [width, height] = staging.size;
     let samples = staging.samples;
@@ -356,7 +403,7 @@ fn scene(subject: &Subject<'_>, file: &Path, bare: bool) -> String {
     <sensor type="{sensor}">{field}
         <float name="near_clip" value="{near}"/>
         <float name="far_clip" value="{far}"/>
-        <transform name="to_world">{to_world}</transform>
+        {to_world}{shutter}
         <film type="hdrfilm"><integer name="width" value="{width}"/><integer name="height" value="{height}"/>{pixels}</film>
         <sampler type="{sampler}"><integer name="sample_count" value="{samples}"/></sampler>
     </sensor>
@@ -379,6 +426,7 @@ fn bodies(subject: &Subject<'_>, file: &Path, bare: bool) -> String {
         plugin,
         mesh,
         bodies,
+        staging,
         ..
     } = subject;
     // A glTF without normals is meant to be flat; other formats leave them to be computed, which would round off the
@@ -394,6 +442,11 @@ fn bodies(subject: &Subject<'_>, file: &Path, bare: bool) -> String {
         let mut more = String::new();
         if bare {
             more += &line(r#"<boolean name="bare" value="true"/>"#);
+        }
+        if !staging.moments().is_empty() {
+            let times: Vec<String> = staging.moments().iter().map(f32::to_string).collect();
+            let times = times.join(", ");
+            more += &line(&format!(r#"<string name="times" value="{times}"/>"#));
         }
         if let Some(surface) = body.surface {
             more += &line(&format!(r#"<integer name="surface" value="{surface}"/>"#));

@@ -8,7 +8,7 @@ use super::lights;
 use crate::budget::Budget;
 use crate::description::{Description, Kind, NodeId, Options, escaped};
 use crate::error::{Error, Location, Result};
-use crate::mesh::GltfLight;
+use crate::mesh::{GltfAnimation, GltfLight};
 
 /// Which way is up in a mesh file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -119,8 +119,8 @@ pub struct Staging {
     pub background: Background,
     /// Whether it stands on a ground.
     pub ground: bool,
-    /// Whether its file's animation is seen while a shutter is open.
-    pub deforms: bool,
+    /// When its file's animation is looked at, if it is.
+    pub animation: Option<GltfAnimation>,
 }
 
 impl Default for Staging {
@@ -139,7 +139,7 @@ impl Default for Staging {
             lighting: Lighting::Auto,
             background: Background::Sky,
             ground: true,
-            deforms: false,
+            animation: None,
         }
     }
 }
@@ -148,6 +148,17 @@ impl Staging {
     /// The film's width over its height.
     pub(super) fn aspect(&self) -> f64 {
         f64::from(self.size[0]) / f64::from(self.size[1])
+    }
+
+    /// When the file's animation is looked at; nothing where it is at rest.
+    pub(super) fn moments(&self) -> &[f32] {
+        let animation = self.animation.as_ref();
+        animation.map_or(&[], |animation| &animation.moments)
+    }
+
+    /// Whether the file's animation is seen while a shutter is open.
+    pub(super) fn deforms(&self) -> bool {
+        self.moments().len() > 1
     }
 
     /// Whether another camera is asked for than the file's own.
@@ -238,9 +249,15 @@ impl Staging {
         }
     }
 
-    /// The lights around a mesh at `center`: those of its own file, where there are any, else what is asked for; `key`
-    /// points to where the lamp or the sun is.
-    pub(super) fn lights(&self, center: Vec3, radius: f32, key: Vec3, own: &[GltfLight]) -> String {
+    /// The lights around a mesh at `center`: those of its own file at all moments, where there are any, else what is asked
+    /// for; `key` points to where the lamp or the sun is.
+    pub(super) fn lights(
+        &self,
+        center: Vec3,
+        radius: f32,
+        key: Vec3,
+        own: &[Vec<GltfLight>],
+    ) -> String {
         let even = |[r, g, b]: [f32; 3]| {
             format!(
                 r#"<emitter type="constant"><rgb name="radiance" value="{r}, {g}, {b}"/></emitter>"#
@@ -251,8 +268,8 @@ impl Staging {
             Background::Color(color) => Some(even(*color)),
             Background::Environment(path) => Some(self.environment(path)),
         };
-        if !own.is_empty() {
-            return background.unwrap_or_default() + &lights::emitters(own);
+        if own.iter().any(|lights| !lights.is_empty()) {
+            return background.unwrap_or_default() + &lights::emitters(own, self.moments());
         }
         let sky = |own: [f32; 3]| background.clone().unwrap_or_else(|| even(own));
         match &self.lighting {

@@ -57,7 +57,7 @@ pub(super) fn own(
         });
     }
     let shines = |surface: &Surface| surface.emission != [0.0; 3];
-    if staging.deforms && surfaces.iter().any(shines) {
+    if staging.deforms() && surfaces.iter().any(shines) {
         let message =
             "the emission of its materials is left out: a mesh that deforms cannot be a light";
         let warning = Error::input(message).at(place);
