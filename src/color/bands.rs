@@ -15,7 +15,7 @@ use super::samples::{Columns, Samples, Spectra as _, Spectral as _};
 use super::spectrum::{Spectrum, Upsampled};
 use super::texels::Pixels;
 use super::upsample::Table;
-use crate::lanes::{Call, Ints as _, Kernel, Lanes, Task, Vec2};
+use crate::lanes::{Call, Ints as _, Lanes, Vec2};
 
 /// Bands of which a path carries up to `N` in `N` lanes; lanes in excess carry nothing. More bands take several passes.
 #[derive(Clone, Debug)]
@@ -63,14 +63,6 @@ impl<const N: usize> ColorModel for Bands<N> {
     type Wavelengths = [f32; N];
     type Sample = Samples<N>;
     type Columns<F: Lanes> = Columns<F, N>;
-
-    fn run<T: Task>(kernel: Kernel, task: T) -> T::Output {
-        // Sixteen lanes of more channels take longer to compile than they save.
-        match N <= 32 {
-            true => kernel.run_many(task),
-            false => kernel.run_single(task),
-        }
-    }
 
     fn passes(&self) -> u32 {
         self.comb.count().div_ceil(self.carried.count()) as u32

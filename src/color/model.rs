@@ -4,7 +4,7 @@
 
 use super::samples::{Spectra, Spectral};
 use super::texels::Pixels;
-use crate::lanes::{Kernel, Lanes, Task, Vec2};
+use crate::lanes::{Lanes, Vec2};
 
 /// A colour as a scene file gives it.
 #[derive(Clone, Debug, PartialEq)]
@@ -57,10 +57,6 @@ pub trait ColorModel: Clone + std::fmt::Debug + Send + Sync + 'static {
     type Sample: Spectral;
     /// The samples of paths in lanes.
     type Columns<F: Lanes>: Spectra<F>;
-
-    /// Does `task`, which is of this model, with the instructions of `kernel`. Models of many channels do it with one lane:
-    /// more would take all the registers there are, and twice as long to compile.
-    fn run<T: Task>(kernel: Kernel, task: T) -> T::Output;
 
     /// How many paths a sample takes: more than one where there are more bands than a path carries.
     fn passes(&self) -> u32 {

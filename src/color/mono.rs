@@ -5,7 +5,7 @@ use super::model::{Color, ColorModel, Role, luminance};
 use super::rgb::{Rgb, check};
 use super::samples::{Columns, Samples};
 use super::texels::Pixels;
-use crate::lanes::{Kernel, Lanes, Task};
+use crate::lanes::Lanes;
 
 /// The model of plain numbers; a colour counts as its luminance.
 #[derive(Clone, Copy, Debug, Default)]
@@ -17,10 +17,6 @@ impl ColorModel for Mono {
     type Wavelengths = ();
     type Sample = Samples<1>;
     type Columns<F: Lanes> = Columns<F, 1>;
-
-    fn run<T: Task>(kernel: Kernel, task: T) -> T::Output {
-        kernel.run(task)
-    }
 
     fn wavelengths(&self, _u: impl FnOnce() -> f32) {}
 

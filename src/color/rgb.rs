@@ -6,7 +6,7 @@ use super::d65::d65;
 use super::model::{Color, ColorModel, Role, luminance, xyz_to_rgb};
 use super::samples::{Columns, Samples};
 use super::texels::{Packed, Pixels};
-use crate::lanes::{Kernel, Lanes, Task};
+use crate::lanes::Lanes;
 
 /// The RGB colour model.
 #[derive(Clone, Copy, Debug, Default)]
@@ -18,10 +18,6 @@ impl ColorModel for Rgb {
     type Wavelengths = ();
     type Sample = Samples<3>;
     type Columns<F: Lanes> = Columns<F, 3>;
-
-    fn run<T: Task>(kernel: Kernel, task: T) -> T::Output {
-        kernel.run(task)
-    }
 
     fn wavelengths(&self, _u: impl FnOnce() -> f32) {}
 

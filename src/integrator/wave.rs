@@ -545,7 +545,7 @@ impl<'a, C: ColorModel, T: 'static, M: Copy + 'static> Wave<'a, C, T, M> {
                     cones: &mut self.cones,
                 },
             };
-            C::run(scene.tracer().kernel(), blocks);
+            scene.tracer().kernel().run(blocks);
             settle(shading, &mut self.shadows, cost);
             self.shadows.clear();
             done = end;

@@ -82,26 +82,6 @@ impl Kernel {
             Set::Avx512 => unsafe { x86::avx512::run(task) },
         }
     }
-
-    /// Does `task`, whose paths have many channels: over lanes where these are sixteen, else with one.
-    pub fn run_many<T: Task>(self, task: T) -> T::Output {
-        match self.0 {
-            // SAFETY: a `Kernel` exists only where the processor has its instructions.
-            #[cfg(target_arch = "x86_64")]
-            Set::Avx512 => unsafe { x86::avx512::run(task) },
-            _ => self.run_single(task),
-        }
-    }
-
-    /// Does `task` with one lane, where the instructions serve the channels of each path: those of AVX2 at most.
-    pub fn run_single<T: Task>(self, task: T) -> T::Output {
-        match self.0 {
-            Set::Portable => task.run::<f32>(),
-            // SAFETY: a `Kernel` exists only where the processor has its instructions, and what has AVX-512 has AVX2.
-            #[cfg(target_arch = "x86_64")]
-            Set::Avx2 | Set::Avx512 => unsafe { x86::single::run(task) },
-        }
-    }
 }
 
 impl Default for Kernel {

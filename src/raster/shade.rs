@@ -270,7 +270,7 @@ impl<'s, C: ColorModel> Shader<'s, C> {
                 blocked: blocked.as_deref_mut(),
                 colors,
             };
-            C::run(self.scene.tracer().kernel(), of_one);
+            self.scene.tracer().kernel().run(of_one);
         }
     }
 

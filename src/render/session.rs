@@ -75,8 +75,7 @@ fn in_bands<T: Task>(task: T, comb: Comb, responses: Arc<[Response]>) -> Result<
     match comb.count() {
         ..=8 => task.run(Bands::<8>::new(comb, responses)),
         9..=16 => task.run(Bands::<16>::new(comb, responses)),
-        17..=32 => task.run(Bands::<32>::new(comb, responses)),
-        _ => task.run(Bands::<64>::new(comb, responses)),
+        _ => task.run(Bands::<32>::new(comb, responses)),
     }
 }
 

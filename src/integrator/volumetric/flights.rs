@@ -89,7 +89,7 @@ impl<C: ColorModel> Round<'_, C> {
         let media = self.paths.things.iter().map(|path| path.media.medium);
         runs.sort(media.map(|medium| medium.map(|medium| medium.index())));
         let kernel = self.scene.tracer().kernel();
-        C::run(kernel, Flights { round: self, runs });
+        kernel.run(Flights { round: self, runs });
     }
 
     /// Paths in one medium.

@@ -124,7 +124,7 @@ impl<'a, C: ColorModel> Segments<'a, C> {
                     dimension: first + SEGMENT_DRAWS,
                     part,
                 };
-                C::run(scene.tracer().kernel(), thin);
+                scene.tracer().kernel().run(thin);
             }
             self.materials.sort(self.hits.iter().map(|hit| {
                 let met = !hit.is_miss();
@@ -144,7 +144,7 @@ impl<'a, C: ColorModel> Segments<'a, C> {
                 hits: &self.hits,
                 asked,
             };
-            C::run(scene.tracer().kernel(), pass);
+            scene.tracer().kernel().run(pass);
             let both = asked.things.iter().zip(&self.hits);
             let goes_on = both.map(|(segment, hit)| !hit.is_miss() && !segment.value.is_black());
             self.kept.clear();

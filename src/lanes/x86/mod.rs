@@ -6,7 +6,6 @@ use std::arch::x86_64::*;
 
 pub(super) mod avx2;
 pub(super) mod avx512;
-pub(super) mod single;
 
 /// Operators of a type that holds registers, each a function of the processor's.
 macro_rules! operators {
