@@ -23,6 +23,8 @@ use crate::texture::{Palettes, Texture};
 pub struct DirectionalArea<C: ColorModel> {
     radiance: Texture<C>,
     shape: Arc<Geometry>,
+    /// Whether the shape moves; then there is no light.
+    moves: bool,
 }
 
 impl<C: ColorModel> DirectionalArea<C> {
@@ -47,14 +49,20 @@ impl<C: ColorModel> DirectionalArea<C> {
             return Err(properties.error("", message).help("nest it in a <shape>"));
         };
         let Palettes { colors, .. } = context.palettes;
-        let warning = properties.error(
-            "",
-            "paths from the camera find no light of a directionalarea",
-        );
-        colors.warn(warning.help(
-            "ptracer and bdpt follow it from the light; an area emitter shines in all directions",
-        ));
+        let moves = context.motion.is_some();
+        let (message, help) = match moves {
+            false => (
+                "paths from the camera find no light of a directionalarea",
+                "ptracer and bdpt follow it from the light; an area emitter shines in all directions",
+            ),
+            true => (
+                "a directionalarea that moves gives no light",
+                "let it stand, and move what it lights",
+            ),
+        };
+        colors.warn(properties.error("", message).help(help));
         Ok(Self {
+            moves,
             radiance: colors.texture(properties, "radiance", Role::Emission)?,
             shape: shape.clone(),
         })
@@ -77,6 +85,9 @@ impl<C: ColorModel> Emitter<C> for DirectionalArea<C> {
         draw: &Draw,
         wavelengths: &C::Wavelengths,
     ) -> Option<Emission<'_, C::Sample>> {
+        if self.moves {
+            return None;
+        }
         let place = place_on(&self.shape, draw.place)?;
         let direction = place.front;
         let (at, origin) = place.toward(direction);
@@ -95,6 +106,9 @@ impl<C: ColorModel> Emitter<C> for DirectionalArea<C> {
     }
 
     fn emitted_power(&self, color: &C, _radius: f64) -> f64 {
-        self.shape.area() * mean_over_square(color, &self.radiance)
+        match self.moves {
+            true => 0.0,
+            false => self.shape.area() * mean_over_square(color, &self.radiance),
+        }
     }
 }

@@ -155,6 +155,11 @@ impl Pose {
         })
     }
 
+    /// Along the axes; no component is 0, and all are negative where it mirrors.
+    pub fn scale(&self) -> DVec3 {
+        self.scale
+    }
+
     /// Whether it turns right hands into left ones.
     pub fn mirrors(&self) -> bool {
         self.scale.x < 0.0

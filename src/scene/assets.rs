@@ -219,7 +219,7 @@ impl<'a> Plan<'a> {
                         self.problems.push(error.at(emitter.location()));
                     }
                 }
-                let moving = Placement::of(&properties)?.moving;
+                let moving = Placement::of_shape(&properties)?.moving;
                 let space = self.moved(&properties, space, moving)?;
                 self.shapes.push(Planned { properties, space });
                 Ok(())

@@ -42,6 +42,7 @@ use crate::family;
 use crate::interaction::{Hit, Interaction, Ray, offset};
 use crate::lanes::{self, Lanes, Mask as _};
 use crate::math::Moving;
+use crate::math::moving::Pose;
 use crate::mesh::{Loaded, Mesh, MeshFile, ReadOptions, Time, read};
 use deforming::Sets;
 
@@ -603,7 +604,7 @@ pub(crate) fn deforms(properties: &Properties<'_>) -> bool {
 
 /// The property `to_world`, the identity by default, and then `outer`.
 fn to_world(properties: &Properties<'_>, outer: &DMat4) -> Result<DMat4> {
-    Ok(*outer * Placement::of(properties)?.still)
+    Ok(*outer * Placement::of_shape(properties)?.still)
 }
 
 /// The property `to_world` of a shape.
@@ -611,12 +612,36 @@ fn to_world(properties: &Properties<'_>, outer: &DMat4) -> Result<DMat4> {
 pub struct Placement {
     /// What stands still: the whole, unless it moves.
     pub still: DMat4,
-    /// What moves; then that which stands still is the identity.
+    /// What moves, around that.
     pub moving: Option<Moving>,
 }
 
 impl Placement {
-    /// Of what `properties` name.
+    /// Of a shape: of one that moves the scale of the first keyframe stands still. So a shape is built as if it stood, for
+    /// which scales may mean more than space: the radii of curves are not scaled, and mirrored triangles have their sides swapped.
+    ///
+    /// # Errors
+    /// Where it makes no motion.
+    pub fn of_shape(properties: &Properties<'_>) -> Result<Self> {
+        let whole = Self::of(properties)?;
+        let keyframes = properties.animation("to_world")?;
+        let (Some(_), Some(keyframes)) = (&whole.moving, keyframes) else {
+            return Ok(whole);
+        };
+        let scale = Pose::new(&keyframes[0].1).map(|pose| pose.scale());
+        let scale = scale.map_err(|why| properties.error("to_world", why.to_string()))?;
+        let rest = DMat4::from_scale(scale.recip());
+        let moving: Vec<_> = (keyframes.iter())
+            .map(|(time, matrix)| (*time, *matrix * rest))
+            .collect();
+        let moving = Moving::new(&moving);
+        Ok(Self {
+            still: DMat4::from_scale(scale),
+            moving: Some(moving.map_err(|why| properties.error("to_world", why.to_string()))?),
+        })
+    }
+
+    /// Of what `properties` name; what stands still is the identity where anything moves.
     ///
     /// # Errors
     /// Where it makes no motion.
