@@ -855,6 +855,34 @@ fn an_animation_stands_where_it_is_at_a_time() {
         Vec3::new(2.0 + 2.0 * half, 2.0 * half, 0.5 + 0.25),
     );
     near(Some(9.0), Vec3::new(4.0, 6.0, 1.0));
+    // A quarter turn in six pieces, the spline in eight, and the step within no time.
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("test.gltf");
+    std::fs::write(&path, document.text()).unwrap();
+    let looked = |shutter| {
+        let animation = read_gltf_animation(&path, shutter, &Budget::default());
+        let GltfAnimation { span, moments } = animation.unwrap().unwrap();
+        assert_eq!(span, [1.0, 3.0]);
+        assert!(moments.windows(2).all(|pair| pair[0] < pair[1]));
+        moments
+    };
+    let third = |n: f32| 1.0 + 2.0 * (n / 6.0);
+    let before = 1.0_f32.next_down();
+    let until = [
+        0.0,
+        before,
+        1.0,
+        1.25,
+        third(1.0),
+        1.5,
+        third(2.0),
+        1.75,
+        2.0,
+    ];
+    assert_eq!(looked([0.0, 2.0]), until);
+    let after = [third(5.0), 2.75, 3.0_f32.next_down(), 3.0, 9.0];
+    assert!(looked([2.5, 9.0]).ends_with(&after));
+    assert_eq!(looked([2.0, 2.0]), [2.0]);
 }
 
 #[test]

@@ -285,12 +285,17 @@ fn own_camera(cameras: &[GltfCamera], aspect: f64) -> Option<OwnCamera> {
     })
 }
 
-/// Times of an animation at which it is looked at to frame it: its moments' ends, and evenly over all of it.
+/// Times of an animation at which it is looked at to frame it: both ends, and between them by the golden ratio, which keeps
+/// step with no turn; and when the shutter closes.
 fn looks(animation: &GltfAnimation) -> Vec<f32> {
-    const LOOKS: u8 = 5;
+    const LOOKS: u8 = 8;
+    const GOLDEN: f32 = 0.618_034;
     let [first, last] = animation.span;
-    let even = (0..LOOKS).map(|i| first + (last - first) * f32::from(i) / f32::from(LOOKS - 1));
-    even.chain(animation.moments.last().copied()).collect()
+    let between = (0..LOOKS).map(|i| first + (last - first) * (f32::from(i) * GOLDEN).fract());
+    between
+        .chain([last])
+        .chain(animation.moments.last().copied())
+        .collect()
 }
 
 /// Whether a triangle can be seen from somewhere.
@@ -533,6 +538,72 @@ mod tests {
         );
         near(to_world.transform_vector3(DVec3::Z), DVec3::NEG_Z);
         near(to_world.transform_vector3(DVec3::X), DVec3::NEG_X);
+    }
+
+    /// What stands on the camera's node goes 2 to the right in a second, as does what the file's other node shows.
+    #[test]
+    fn a_gltf_files_camera_and_lights_move_with_their_nodes() {
+        use base64::Engine as _;
+        let keys = [0.0_f32, 1.0, 0.0, 0.0, 4.0, 2.0, 0.0, 4.0];
+        let bytes: Vec<u8> = keys.iter().flat_map(|v| v.to_le_bytes()).collect();
+        let data = base64::engine::general_purpose::STANDARD.encode(bytes);
+        let light = r#""extensions":{"KHR_lights_punctual":{"light":0}}"#;
+        let text = GLTF
+            .replace("\"camera\":0", &format!("\"camera\":0,{light}"))
+            .replace(
+                r#""asset""#,
+                r#""extensions":{"KHR_lights_punctual":{"lights":[{"type":"point","intensity":40}]}},
+                "animations":[{"channels":[{"sampler":0,"target":{"node":1,"path":"translation"}}],
+                "samplers":[{"input":1,"output":2}]}],"asset""#,
+            )
+            .replace(
+                r#""accessors":["#,
+                r#""accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"},
+                {"bufferView":1,"componentType":5126,"count":2,"type":"SCALAR"},
+                {"bufferView":1,"byteOffset":8,"componentType":5126,"count":2,"type":"VEC3"},"#,
+            )
+            .replace("\"byteLength\":36}],", "\"byteLength\":36},{\"buffer\":1,\"byteLength\":32}],")
+            .replace(
+                r#""buffers":["#,
+                r#""buffers":[{"byteLength":36,"uri":"data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"},"#,
+            )
+            .replace(
+                r#"{"byteLength":36,"uri":"data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}]"#,
+                &format!(r#"{{"byteLength":32,"uri":"data:application/octet-stream;base64,{data}"}}]"#),
+            );
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("moves.gltf");
+        std::fs::write(&path, text).unwrap();
+        let budget = Budget::default();
+        let seen = |shutter: Option<[f32; 2]>| {
+            let animation = shutter.map(|shutter| {
+                let animation = crate::mesh::read_gltf_animation(&path, shutter, &budget);
+                animation.unwrap().unwrap()
+            });
+            let staging = Staging {
+                animation,
+                ..Staging::default()
+            };
+            let bare = describe_mesh(&path, &staging, &Options::default(), &budget).unwrap();
+            let root = bare.description.root();
+            let places = |kind: Kind, time: f32| {
+                let node = root.children(kind)[0];
+                node.motion("to_world").unwrap().at(time).translation()
+            };
+            [0.25, 0.75].map(|time| [Kind::Sensor, Kind::Emitter].map(|kind| places(kind, time)))
+        };
+        let [rest, middle] = [0.0, 1.0].map(|x| Vec3::new(x, 0.0, 4.0));
+        let near = |found: [[Vec3; 2]; 2], expected: [Vec3; 2]| {
+            let pairs = found.into_iter().zip(expected);
+            let off = pairs.flat_map(|(found, expected)| found.map(|p| p.distance(expected)));
+            assert!(off.into_iter().all(|off| off < 1e-5), "{found:?}");
+        };
+        near(seen(None), [rest; 2]);
+        near(seen(Some([0.5, 0.5])), [middle; 2]);
+        near(
+            seen(Some([0.0, 1.0])),
+            [0.5, 1.5].map(|x| Vec3::new(x, 0.0, 4.0)),
+        );
     }
 
     #[test]
