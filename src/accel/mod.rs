@@ -328,7 +328,8 @@ impl Tracer {
     /// Whether anything moves.
     pub fn moves(&self) -> bool {
         let moves = |instance: &Instance| !instance.to_world.is_still();
-        self.deforms || self.instances.iter().any(moves)
+        let deforms = |shape: &Geometry| matches!(shape, Geometry::Deforming(_));
+        self.instances.iter().any(moves) || self.shapes.iter().any(deforms)
     }
 
     /// Primitives, each instance's counted once.

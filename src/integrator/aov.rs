@@ -10,6 +10,7 @@ use super::limits;
 use super::{Context, Cost, Estimate, Estimates, Estimator, Footprint, Integrator, Start};
 use crate::color::{ColorModel, Spectral};
 use crate::description::declared::{Plugin, nested, string};
+use crate::description::properties::STRICT;
 use crate::description::{Kind, Properties, Property, Value};
 use crate::error::Result;
 use crate::interaction::{Hit, Interaction, Ray};
@@ -100,6 +101,10 @@ impl<C: ColorModel> Aov<C> {
                     .suggest(kind.trim(), kinds)
                     .help(format!("there are {all}")));
             };
+            if properties.is_strict() && matches!(quantity, Quantity::Motion) {
+                let error = properties.error("aovs", "the kind \"motion\" is Étendue's own");
+                return Err(error.help(STRICT));
+            }
             quantities.push((name.trim().to_owned(), *quantity, *suffixes));
         }
         let mut nested = Vec::new();

@@ -120,7 +120,9 @@ pub(super) fn draw<C: ColorModel>(
     if view.sensor.has_lens() {
         note("the z-buffer sees through a pinhole: all is sharp");
     }
-    if time < closes && tracer.moves() {
+    let camera = |time: f32| view.sensor.world_to_camera(time);
+    let turns = || [0.5 * (time + closes), closes].map(camera) != [camera(time); 2];
+    if time < closes && (tracer.moves() || turns()) {
         note("the z-buffer sees the moment when the shutter opens: nothing is blurred by motion");
     }
     let masks =
