@@ -30,11 +30,11 @@ pub(super) struct ImageArguments {
     /// Bands from A to B nm; R, G and B are then those of the light in that range
     #[arg(long, value_name = "A,B", value_parser = parse::band_range, requires = "bands", help_heading = IMAGE)]
     pub(super) band_range: Option<[f32; 2]>,
-    /// When the shutter is open, in place of the scene's shutter_open and shutter_close: two times, or degrees of a
+    /// Motion blur: when the shutter is open, in place of the scene's shutter_open and shutter_close: two times, or degrees of a
     /// frame, which is 360. In --frames the times begin with the frame's, its number divided by --fps
     #[arg(long, value_name = "OPEN,CLOSE|DEGREES", value_parser = parse::shutter, allow_hyphen_values = true, help_heading = IMAGE)]
     shutter: Option<parse::Shutter>,
-    /// Frames in a unit of the scene's time
+    /// Frames in a unit of the scene's time; of a glTF file's animation that is a second
     #[arg(long, default_value_t = 24.0, value_name = "N", value_parser = parse::positive, help_heading = IMAGE)]
     fps: f64,
     #[command(flatten)]

@@ -87,7 +87,8 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "X,Y", value_parser = parse::place, conflicts_with = "noise_threshold", help_heading = ADAPTIVE)]
     foveate: Option<[f64; 2]>,
 
-    /// Render frames START up to, and without, END; each defines $frame
+    /// Render frames START up to, and without, END; each defines $frame. A bare glTF file's animation is seen at the
+    /// frame's number divided by --fps; a scene's <animation> is seen where the shutter is open (--shutter 0: sharp)
     #[arg(long, value_name = "START:END[:STEP]", value_parser = parse::frames, allow_hyphen_values = true, help_heading = SERIES)]
     frames: Option<Frames>,
     /// Let the camera go around the scene in N frames, all of them unless --frames says which
