@@ -55,16 +55,26 @@ pub struct GltfAnimation {
     /// Times from when a shutter opens to when it closes, ascending: between any two what moves goes nearly straight. One
     /// where the shutter is open for no time.
     pub moments: Vec<f32>,
+    /// How many more of them there would be, if that were not too many.
+    pub passed_over: usize,
 }
 
 /// How far a node may turn between two moments, in radians: the middle of an arc is off by 1 − cos of half of it, 0.9 %.
 const TURN: f64 = std::f64::consts::PI / 12.0;
 /// Moments between two keyframes of a cubic spline.
 const PIECES: u32 = 8;
+/// Moments are no more: each is a set of vertices.
+const MOST: usize = 256;
 
-/// When the first animation is looked at while a shutter is `open`.
-pub(super) fn moments(accessors: &Accessors<'_>, [open, close]: [f32; 2]) -> OrWhy<GltfAnimation> {
+/// When the first animation is looked at while a shutter is open; `None` where nothing moves.
+pub(super) fn moments(
+    accessors: &Accessors<'_>,
+    [open, close]: [f32; 2],
+) -> OrWhy<Option<GltfAnimation>> {
     let channels = channels(accessors)?;
+    if channels.is_empty() {
+        return Ok(None);
+    }
     let keys = || channels.iter().flat_map(|moving| &moving.keys.times);
     let span = [
         keys().copied().fold(f32::INFINITY, f32::min),
@@ -91,7 +101,17 @@ pub(super) fn moments(accessors: &Accessors<'_>, [open, close]: [f32; 2]) -> OrW
     }
     moments.sort_by(f32::total_cmp);
     moments.dedup();
-    Ok(GltfAnimation { span, moments })
+    let all = moments.len();
+    if all > MOST {
+        moments = (0..MOST)
+            .map(|i| moments[i * (all - 1) / (MOST - 1)])
+            .collect();
+    }
+    Ok(Some(GltfAnimation {
+        span,
+        passed_over: all - moments.len(),
+        moments,
+    }))
 }
 
 /// What of a node moves.

@@ -213,10 +213,7 @@ pub fn read_gltf_animation(
     budget: &Budget,
 ) -> Result<Option<GltfAnimation>> {
     with_accessors(path, budget, true, |_, accessors| {
-        if accessors.root.animations.is_empty() {
-            return Ok(None);
-        }
-        animation::moments(accessors, shutter).map(Some)
+        animation::moments(accessors, shutter)
     })
 }
 

@@ -861,8 +861,12 @@ fn an_animation_stands_where_it_is_at_a_time() {
     std::fs::write(&path, document.text()).unwrap();
     let looked = |shutter| {
         let animation = read_gltf_animation(&path, shutter, &Budget::default());
-        let GltfAnimation { span, moments } = animation.unwrap().unwrap();
-        assert_eq!(span, [1.0, 3.0]);
+        let GltfAnimation {
+            span,
+            moments,
+            passed_over,
+        } = animation.unwrap().unwrap();
+        assert_eq!((span, passed_over), ([1.0, 3.0], 0));
         assert!(moments.windows(2).all(|pair| pair[0] < pair[1]));
         moments
     };

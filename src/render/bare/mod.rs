@@ -92,6 +92,17 @@ pub fn describe_mesh(
         };
         return Err(error.at(&Location::of_file(path)));
     };
+    if let Some(animation) = &staging.animation
+        && animation.passed_over > 0
+    {
+        let looks = animation.moments.len();
+        let message = format!(
+            "while the shutter is open the animation is looked at {looks} times, which passes over {} keyframes and turns",
+            animation.passed_over
+        );
+        let warning = Error::input(message).at(&Location::of_file(path));
+        loaded.warnings.extend_from_slice(warning.problems());
+    }
     // A camera that sees all of an animation stands still from one image to the next.
     let mut corners = Vec::new();
     for time in staging.animation.iter().flat_map(looks) {
@@ -292,9 +303,10 @@ fn looks(animation: &GltfAnimation) -> Vec<f32> {
     const GOLDEN: f32 = 0.618_034;
     let [first, last] = animation.span;
     let between = (0..LOOKS).map(|i| first + (last - first) * (f32::from(i) * GOLDEN).fract());
+    let ends = [last].into_iter().chain(animation.moments.last().copied());
     between
-        .chain([last])
-        .chain(animation.moments.last().copied())
+        .chain(ends)
+        .filter(|time| time.is_finite())
         .collect()
 }
 
