@@ -17,8 +17,8 @@ use crate::budget::Budget;
 use crate::description::{Description, Kind, Options, escaped};
 use crate::error::{Error, Location, Result};
 use crate::mesh::{
-    Attribute, GltfAnimation, GltfCamera, GltfLight, GltfSetting, Mesh, MeshFile, Projection,
-    ReadMesh, ReadOptions, Time, extension, read, read_gltf_settings,
+    Attribute, GltfAnimation, GltfCamera, GltfLight, GltfSetting, Loaded, Mesh, MeshFile,
+    Projection, ReadMesh, ReadOptions, Time, extension, read, read_gltf_settings,
 };
 use crate::shape::Bounds;
 use frame::FOV;
@@ -100,8 +100,7 @@ pub fn describe_mesh(
             "while the shutter is open the animation is looked at {looks} times, which passes over {} keyframes and turns",
             animation.passed_over
         );
-        let warning = Error::input(message).at(&Location::of_file(path));
-        loaded.warnings.extend_from_slice(warning.problems());
+        tell(&mut loaded, path, message);
     }
     // A camera that sees all of an animation stands still from one image to the next.
     let mut corners = Vec::new();
@@ -141,8 +140,7 @@ pub fn describe_mesh(
     };
     let own = staging.own_material(options, budget)?;
     for message in unseen(&loaded.mesh) {
-        let warning = Error::input(message).at(&Location::of_file(path));
-        loaded.warnings.extend_from_slice(warning.problems());
+        tell(&mut loaded, path, message);
     }
     let settings = match plugin {
         "gltf" => read_gltf_settings(path, staging.moments(), budget)?,
@@ -164,16 +162,14 @@ pub fn describe_mesh(
         (left > 0).then(|| Some(format!("the file's own lights ({left}) are left out")))
     };
     if let Some(message) = said.flatten() {
-        let warning = Error::input(message).at(&Location::of_file(path));
-        loaded.warnings.extend_from_slice(warning.problems());
+        tell(&mut loaded, path, message);
     }
     if let (Lighting::Environment(_), Background::Color(_) | Background::Environment(_)) =
         (&staging.lighting, &staging.background)
     {
         let message =
             "what is seen beside the mesh is the image of --light: --background is left out";
-        let warning = Error::input(message).at(&Location::of_file(path));
-        loaded.warnings.extend_from_slice(warning.problems());
+        tell(&mut loaded, path, message);
     }
     let surfaces = surface::own(&mut loaded, staging, budget, &Location::of_file(path));
     let mut subject = Subject {
@@ -235,6 +231,12 @@ pub fn describe_mesh(
         text: written,
         mesh,
     })
+}
+
+/// Warns of what is odd about the file.
+fn tell(loaded: &mut Loaded, path: &Path, message: impl Into<String>) {
+    let warning = Error::input(message.into()).at(&Location::of_file(path));
+    loaded.warnings.extend_from_slice(warning.problems());
 }
 
 /// What the scene shows.
