@@ -235,7 +235,7 @@ mod tests {
     #[test]
     fn greys_stay_grey_and_what_is_no_color_is_shown_too() {
         let agx = Agx::new();
-        assert_eq!(agx.view([0.0; 3]), [0.0; 3]);
+        assert!(agx.view([0.0; 3]).iter().all(|v| *v < 1e-30));
         for (grey, shown) in [(0.18, 0.18), (0.18 * 2f32.powf(6.5), 1.0)] {
             let seen = agx.view([grey; 3]);
             assert!(seen.iter().all(|v| (v - shown).abs() < 1e-4), "{seen:?}");

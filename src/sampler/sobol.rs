@@ -15,9 +15,10 @@ use crate::error::Result;
 use crate::lanes::{Divisor, Ints, Lanes, Long, Vec2, random};
 
 /// Which sequence each dimension of a block takes. Lens, light and direction have pairs that are good nets themselves
-/// (of 16 to 1,024 points, t ≤ 2), and so has time with each of them and of the pixel's (of 8 to 32 points). What they do together, and with choices, is by trial no worse than random points, which neighbouring sequences can be
-/// fivefold: with a time that went badly with the choice of a light, what moves had more noise than random points make.
-const COLUMNS: [usize; SEQUENCES] = [0, 1, 13, 10, 12, 8, 9, 6, 2, 3, 4, 15, 7, 5, 14, 11];
+/// (of 16 to 1,024 points, t ≤ 2), and so has time with each of them and of the pixel's (of 8 to 64 points). What they do
+/// together, and with choices, is by trial no worse than random points, which neighbouring sequences can be fivefold: with a
+/// time that went badly with the choice of a light, what moves had more noise than random points make.
+const COLUMNS: [usize; SEQUENCES] = [0, 1, 4, 9, 3, 14, 7, 11, 2, 6, 10, 13, 12, 5, 15, 8];
 
 /// Dimensions that are sampled jointly.
 const BLOCK: u32 = COLUMNS.len() as u32;
