@@ -704,7 +704,7 @@ impl<'a> Series<'a> {
                 input: &item.input,
                 frame: item.frame.unwrap_or(0),
                 sensor: "0",
-                eye: None,
+                eye: item.eye.map(Eye::name),
             };
             let path = names.expand(&path.to_string_lossy())?;
             etendue::file::write_atomically(&path, text.as_bytes())?;

@@ -80,13 +80,13 @@ fn cicp(png: &[u8]) -> Option<[u8; 2]> {
     loop {
         let (length, after) = rest.split_first_chunk::<4>()?;
         let (kind, data) = after.split_first_chunk::<4>()?;
-        match kind {
-            b"cICP" => return Some([*data.first()?, *data.get(1)?]),
-            b"IDAT" => return None,
+        let length = u32::from_be_bytes(*length) as usize;
+        match (kind, data.get(..length)?) {
+            (b"cICP", [primaries, transfer, ..]) => return Some([*primaries, *transfer]),
+            (b"IDAT", _) => return None,
             _ => {}
         }
         const CHECKSUM: usize = 4;
-        let length = u32::from_be_bytes(*length) as usize;
         rest = data.get(length.checked_add(CHECKSUM)?..)?;
     }
 }

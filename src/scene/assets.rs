@@ -229,7 +229,7 @@ impl<'a> Plan<'a> {
 
     /// Notes the shapes of a node of the scene graph. Nodes are not nested without end.
     fn node(&mut self, properties: &Properties<'a>, space: &Space<'a>) -> Result<()> {
-        let own = Placement::of(properties)?;
+        let own = Placement::of_shape(properties)?;
         let bsdf = properties.child(Kind::Bsdf)?;
         let mut inner = self.moved(properties, space, own.moving)?;
         inner.outer *= own.still;

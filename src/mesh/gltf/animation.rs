@@ -194,6 +194,12 @@ fn moving(
         0 if rows > 0 => values.len() / rows,
         width => width,
     };
+    let ascend = times.windows(2).all(|pair| pair[0] <= pair[1]);
+    if !ascend || !times.iter().all(|time| time.is_finite()) {
+        return Err(
+            "the times of its keyframes must be finite, each after the one before".to_owned(),
+        );
+    }
     if times.is_empty() || width == 0 || values.len() != rows * width {
         let (keys, found) = (times.len(), values.len());
         return Err(format!(

@@ -36,12 +36,12 @@ struct Spot {
     outer_cone_angle: Option<f64>,
 }
 
-/// The lights of a scene, in the order of its nodes.
+/// The lights of a scene, in the order of its nodes; `None` in place of what cannot shine.
 pub(super) fn placed(
     root: &Root<'_>,
     stage: &Stage<'_>,
     notes: &mut Notes,
-) -> OrWhy<Vec<GltfLight>> {
+) -> OrWhy<Vec<Option<GltfLight>>> {
     if stage.lights.is_empty() {
         return Ok(Vec::new());
     }
@@ -55,7 +55,7 @@ pub(super) fn placed(
     for (index, to_world) in &stage.lights {
         let light = at(&file.lights, *index, "light")?;
         let placed = light.placed(to_world, notes);
-        lights.extend(placed.map_err(|why| format!("light {index}: {why}"))?);
+        lights.push(placed.map_err(|why| format!("light {index}: {why}"))?);
     }
     Ok(lights)
 }

@@ -187,19 +187,44 @@ pub fn read_gltf_settings(path: &Path, times: &[f32], budget: &Budget) -> Result
         if times.is_empty() {
             changes.push(Vec::new());
         }
-        let at_times = changes.into_iter().map(|changes| {
+        let (mut cameras, mut lights, mut told) = (Vec::new(), Vec::new(), Vec::new());
+        for changes in changes {
             let mut root = Root::parse(json)?;
             root.apply(changes);
             let stage = Stage::set(&root, &mut Notes::default())?;
             let mut notes = Notes::default();
-            Ok(GltfSetting {
-                camera: stage.camera,
-                lights: lights::placed(&root, &stage, &mut notes)?,
-                warnings: warnings(path, notes.told()),
-            })
+            lights.push(lights::placed(&root, &stage, &mut notes)?);
+            cameras.push(stage.camera);
+            told = notes.told();
+        }
+        // What has no extent for a moment is where it was, or will be first.
+        filled(&mut cameras);
+        for number in 0..lights[0].len() {
+            let mut one: Vec<_> = lights.iter().map(|all| all[number].clone()).collect();
+            filled(&mut one);
+            for (all, light) in lights.iter_mut().zip(one) {
+                all[number] = light;
+            }
+        }
+        let settings = cameras.into_iter().zip(lights);
+        let settings = settings.map(|(camera, lights)| GltfSetting {
+            camera,
+            lights: lights.into_iter().flatten().collect(),
+            warnings: warnings(path, told.clone()),
         });
-        at_times.collect()
+        Ok(settings.collect())
     })
+}
+
+/// Gives what is missing the value before it, or the first there is.
+fn filled<T: Clone>(values: &mut [Option<T>]) {
+    let mut last = values.iter().flatten().next().cloned();
+    for value in values {
+        match value {
+            Some(value) => last = Some(value.clone()),
+            None => value.clone_from(&last),
+        }
+    }
 }
 
 /// When to look at the first animation of the glTF or GLB file `path` from when a shutter opens to when it closes; `None`

@@ -81,7 +81,7 @@ pub fn describe_mesh(
     };
     let read_options = at(staging.moments().first().copied());
     let mut loaded = read(path, &read_options, budget)?;
-    let Some(mut bounds) = loaded.mesh.bounds() else {
+    let Some(bounds) = loaded.mesh.bounds() else {
         let error = match loaded.dropped_triangles {
             0 => Error::input("the file holds no triangle")
                 .help("a mesh has faces; points and lines alone are not drawn"),
@@ -103,15 +103,21 @@ pub fn describe_mesh(
         tell(&mut loaded, path, message);
     }
     // A camera that sees all of an animation stands still from one image to the next.
-    let mut corners = Vec::new();
+    let (mut all, mut corners, mut area) = (Bounds::EMPTY, Vec::new(), has_area(&loaded.mesh));
     for time in staging.animation.iter().flat_map(looks) {
         let looked_at = read(path, &at(Some(time)), budget)?.mesh;
+        area |= has_area(&looked_at);
         if let Some((min, max)) = looked_at.bounds() {
-            bounds = (bounds.0.min(min), bounds.1.max(max));
-            corners.extend(Bounds { min, max }.corners());
+            let seen = Bounds { min, max };
+            all = all.union(seen);
+            corners.extend(seen.corners());
         }
     }
-    if !has_area(&loaded.mesh) {
+    let bounds = match all.is_empty() {
+        true => bounds,
+        false => (all.min, all.max),
+    };
+    if !area {
         let message = "none of the triangles has an area: there is nothing to see";
         return Err(Error::input(message).at(&Location::of_file(path)));
     }
@@ -298,18 +304,15 @@ fn own_camera(cameras: &[GltfCamera], aspect: f64) -> Option<OwnCamera> {
     })
 }
 
-/// Times of an animation at which it is looked at to frame it: both ends, and between them by the golden ratio, which keeps
-/// step with no turn; and when the shutter closes.
+/// Times of an animation at which it is looked at to frame it, whatever the image: both ends, and between them by the golden
+/// ratio, which keeps step with no turn.
 fn looks(animation: &GltfAnimation) -> Vec<f32> {
-    const LOOKS: u8 = 8;
+    const LOOKS: u8 = 12;
     const GOLDEN: f32 = 0.618_034;
     let [first, last] = animation.span;
     let between = (0..LOOKS).map(|i| first + (last - first) * (f32::from(i) * GOLDEN).fract());
-    let ends = [last].into_iter().chain(animation.moments.last().copied());
-    between
-        .chain(ends)
-        .filter(|time| time.is_finite())
-        .collect()
+    let looks = between.chain([last]);
+    looks.filter(|time| time.is_finite()).collect()
 }
 
 /// Whether a triangle can be seen from somewhere.
