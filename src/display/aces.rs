@@ -5,6 +5,7 @@
 
 use glam::{DMat3, DVec3};
 
+use super::within_half;
 use crate::color::{Primaries, adaptation};
 
 /// What the transforms are made of.
@@ -40,14 +41,7 @@ impl Aces {
 
     /// Display-referred linear BT.709 in [0, 1].
     pub(super) fn view(&self, rgb: [f32; 3]) -> [f32; 3] {
-        let finite = rgb.map(|v| {
-            if v.is_nan() {
-                0.0
-            } else {
-                f64::from(v.clamp(-65504.0, 65504.0))
-            }
-        });
-        let aces = self.from_bt709 * DVec3::from(finite);
+        let aces = self.from_bt709 * within_half(rgb);
         let rendered = self.render(aces);
         let shown = self.show(rendered);
         shown.to_array().map(|v| v.clamp(0.0, 1.0) as f32)

@@ -7,6 +7,7 @@
 
 use glam::{DMat3, DVec3};
 
+use super::within_half;
 use crate::color::{Primaries, hsv_to_rgb, rgb_to_hsv};
 
 /// What draws BT.2020's primaries toward grey, by columns.
@@ -89,14 +90,7 @@ impl Agx {
 
     /// Display-referred linear BT.709 in [0, 1].
     pub(super) fn view(&self, rgb: [f32; 3]) -> [f32; 3] {
-        let finite = rgb.map(|v| {
-            if v.is_nan() {
-                0.0
-            } else {
-                f64::from(v.clamp(-65504.0, 65504.0))
-            }
-        });
-        let wide = self.from_bt709 * DVec3::from(finite);
+        let wide = self.from_bt709 * within_half(rgb);
         let drawn = INSET * within(wide, |rgb| with_opponent(rgb, LUMINANCES));
         let curved = drawn.map(|v| self.curve.at(v));
         let [before, _, _] = rgb_to_hsv(drawn.into());

@@ -108,6 +108,16 @@ impl Default for DisplayTransform {
     }
 }
 
+/// A color whose components are no larger than the largest half-precision number, either way; what is no number is 0.
+fn within_half(rgb: [f32; 3]) -> DVec3 {
+    const LARGEST: f32 = 65504.0;
+    let within = rgb.map(|v| match v.is_nan() {
+        true => 0.0,
+        false => f64::from(v.clamp(-LARGEST, LARGEST)),
+    });
+    within.into()
+}
+
 /// Pixels that one task encodes.
 const GRAIN: usize = 1 << 13;
 
