@@ -59,6 +59,16 @@ struct Segment {
     rate: f64,
 }
 
+/// A motion in two factors, so that what is put into the first can be built as if it stood: its scale may mean more than space.
+/// The radii of curves are not scaled, and mirrored triangles have their sides swapped.
+#[derive(Clone, Debug)]
+pub struct Unscaled {
+    /// The scale with which the motion begins, or all but its translation where it begins with a shear.
+    pub scale: DMat4,
+    /// The motion around that: what is left of it at its first keyframe is a rotation and a translation.
+    pub moving: Moving,
+}
+
 /// Parts of a transform at a time.
 #[derive(Clone, Copy, Debug)]
 struct Placed {
@@ -410,7 +420,40 @@ fn image(transform: &DAffine3, [min, max]: [DVec3; 2]) -> [DVec3; 2] {
     [low, high]
 }
 
+impl Link {
+    /// With the scale of its first keyframe, if it has any.
+    fn first(&self) -> DAffine3 {
+        match self {
+            Self::Fixed { forward, .. } => *forward,
+            Self::Track(track) => track.placed((0, 0.0)).forward(),
+        }
+    }
+
+    fn fixed(forward: DAffine3) -> Self {
+        Self::Fixed {
+            forward,
+            inverse: forward.inverse(),
+        }
+    }
+}
+
 impl Chain {
+    /// Takes a scale away from what is innermost.
+    fn unscale(&mut self, scale: DVec3) {
+        match self.links.last_mut() {
+            Some(Link::Track(track)) => {
+                for segment in &mut track.segments {
+                    segment.scale = segment.scale.map(|own| own / scale);
+                    segment.shrink = segment.shrink.map(|_| segment.scale[0].recip());
+                }
+            }
+            _ => {
+                let away = DAffine3::from_scale(scale.recip());
+                self.links.push(Link::fixed(away));
+            }
+        }
+    }
+
     /// At `time`.
     pub fn at(&self, time: f32) -> Transform {
         let time = f64::from(time);
@@ -472,19 +515,11 @@ impl Moving {
     /// `between` is not affine and invertible.
     pub fn product(outer: Option<&Self>, between: &DMat4, inner: Option<&Self>) -> Option<Self> {
         let still = Transform::new(between)?;
-        let fixed = |matrix: DAffine3| Link::Fixed {
-            forward: matrix,
-            inverse: matrix.inverse(),
-        };
-        let links_of = |moving: &Self| match moving {
-            Self::Still(transform) => vec![fixed(transform.forward())],
-            Self::Keyed(chain) => chain.links.clone(),
-        };
-        let mut links: Vec<Link> = outer.map(links_of).unwrap_or_default();
+        let mut links: Vec<Link> = outer.map(Self::links).unwrap_or_default();
         if *between != DMat4::IDENTITY {
-            links.push(fixed(DAffine3::from_mat4(*between)));
+            links.push(Link::fixed(DAffine3::from_mat4(*between)));
         }
-        links.extend(inner.map(links_of).unwrap_or_default());
+        links.extend(inner.map(Self::links).unwrap_or_default());
         if links.iter().any(|link| matches!(link, Link::Track(_))) {
             return Some(Self::Keyed(Arc::new(Chain { links })));
         }
@@ -493,6 +528,51 @@ impl Moving {
         }
         let chain = Chain { links };
         Some(Self::Still(chain.at(0.0)))
+    }
+
+    fn links(&self) -> Vec<Link> {
+        match self {
+            Self::Still(transform) => vec![Link::fixed(transform.forward())],
+            Self::Keyed(chain) => chain.links.clone(),
+        }
+    }
+
+    /// As [`Moving::product`], with the scale of `between` and of the first keyframe of `inner` apart. That of `outer` stays
+    /// where it is.
+    pub fn unscaled(outer: Option<&Self>, between: &DMat4, inner: &Self) -> Option<Unscaled> {
+        let linear = |matrix: DMat3| DMat4::from_mat3(matrix);
+        let mut first = DAffine3::from_mat4(*between);
+        let inner_links = inner.links();
+        for link in &inner_links {
+            first *= link.first();
+        }
+        let scale = match (&inner_links[..], *between == DMat4::IDENTITY) {
+            // To the last bit.
+            ([Link::Track(track)], true) => Some(track.segments[0].scale[0]),
+            _ => Pose::new(&linear(first.matrix3))
+                .ok()
+                .map(|pose| pose.scale()),
+        };
+        let mut chain = match Self::product(outer, between, Some(inner))? {
+            Self::Keyed(chain) => Arc::unwrap_or_clone(chain),
+            moving @ Self::Still(_) => {
+                let scale = DMat4::IDENTITY;
+                return Some(Unscaled { scale, moving });
+            }
+        };
+        let scale = match scale {
+            Some(scale) => {
+                chain.unscale(scale);
+                DMat4::from_scale(scale)
+            }
+            None => {
+                let back = DAffine3::from_mat3(first.matrix3.inverse());
+                chain.links.push(Link::fixed(back));
+                linear(first.matrix3)
+            }
+        };
+        let moving = Self::Keyed(Arc::new(chain));
+        Some(Unscaled { scale, moving })
     }
 
     /// Whether it is the same at all times.
@@ -687,6 +767,43 @@ mod tests {
             let expected = Vec3::new(2.0 * time.cos() + 1.0, 2.0 * time.sin(), 0.0);
             let found = product.at(time).point(Vec3::X);
             assert!(found.distance(expected) < 1e-6, "{time}: {found}");
+        }
+    }
+
+    #[test]
+    fn a_motion_s_first_scale_times_the_rest_is_the_motion() {
+        let shear = DMat4::from_mat3(DMat3::from_cols(
+            DVec3::X,
+            DVec3::new(1.0, 1.0, 0.0),
+            DVec3::Z,
+        ));
+        let motions = motions();
+        for between in [
+            DMat4::IDENTITY,
+            DMat4::from_scale(DVec3::new(-2.0, 3.0, 1.0)),
+            shear,
+        ] {
+            for (outer, inner) in [
+                (None, &motions[0]),
+                (Some(&motions[1]), &motions[2]),
+                (None, &motions[11]),
+                (Some(&motions[2]), &motions[12]),
+            ] {
+                let whole = Moving::product(outer, &between, Some(inner)).unwrap();
+                let Unscaled { scale, moving } = Moving::unscaled(outer, &between, inner).unwrap();
+                for i in 0..20 {
+                    let (time, p) = (4.0 * number(60, i), vector(61, i));
+                    let expected = whole.at(time as f32).point(p.as_vec3());
+                    let scaled = scale.transform_point3(p).as_vec3();
+                    let found = moving.at(time as f32).point(scaled);
+                    assert!(expected.distance(found) < 1e-4, "{expected} {found}");
+                }
+                if outer.is_none() {
+                    let first = moving.at(-1.0).linear();
+                    let round = first.transpose() * first;
+                    assert!(round.abs_diff_eq(glam::Mat3::IDENTITY, 1e-5), "{first}");
+                }
+            }
         }
     }
 

@@ -20,6 +20,7 @@ use crate::accel::Instance;
 use crate::description::{Description, Kind, NodeId, Properties};
 use crate::error::{Error, Problem, Problems, Result};
 use crate::math::Moving;
+use crate::math::moving::Unscaled;
 use crate::mesh::ReadMesh;
 use crate::shape::{self, Geometry, Placement, Setting};
 
@@ -75,7 +76,7 @@ impl Assets {
         let sites = shapes.iter().map(|planned| Site {
             properties: &planned.properties,
             setting: Setting {
-                outer: planned.space.outer,
+                to_world: planned.space.outer,
                 cache,
             },
         });
@@ -144,7 +145,7 @@ struct Planned<'a> {
     space: Space<'a>,
 }
 
-/// Where a shape stands.
+/// Where a shape stands, or what is in a group.
 #[derive(Clone)]
 struct Space<'a> {
     /// The `shapegroup`, if it is in one.
@@ -153,7 +154,7 @@ struct Space<'a> {
     group: u32,
     /// From the space of what moves to the world.
     motion: Option<Moving>,
-    /// The product of the transforms of the groups around it, the outermost first, as far as they stand still.
+    /// The product of the transforms of the groups around it, the outermost first, and its own, as far as they stand still.
     outer: DMat4,
     /// The material of the nearest of those groups that has one.
     bsdf: Option<NodeId>,
@@ -219,8 +220,7 @@ impl<'a> Plan<'a> {
                         self.problems.push(error.at(emitter.location()));
                     }
                 }
-                let moving = Placement::of_shape(&properties)?.moving;
-                let space = self.moved(&properties, space, moving)?;
+                let space = self.inside(&properties, space)?;
                 self.shapes.push(Planned { properties, space });
                 Ok(())
             }
@@ -229,10 +229,8 @@ impl<'a> Plan<'a> {
 
     /// Notes the shapes of a node of the scene graph. Nodes are not nested without end.
     fn node(&mut self, properties: &Properties<'a>, space: &Space<'a>) -> Result<()> {
-        let own = Placement::of_shape(properties)?;
         let bsdf = properties.child(Kind::Bsdf)?;
-        let mut inner = self.moved(properties, space, own.moving)?;
-        inner.outer *= own.still;
+        let mut inner = self.inside(properties, space)?;
         inner.bsdf = bsdf.map(|bsdf| bsdf.node_id()).or(space.bsdf);
         inner.top = false;
         for child in properties.children(Kind::Shape) {
@@ -241,16 +239,15 @@ impl<'a> Plan<'a> {
         Ok(())
     }
 
-    /// The space of what moves in `space`; `space` itself where nothing does.
-    fn moved(
-        &mut self,
-        properties: &Properties<'a>,
-        space: &Space<'a>,
-        moving: Option<Moving>,
-    ) -> Result<Space<'a>> {
-        let deforms = shape::deforms(properties);
-        if moving.is_none() && !deforms {
-            return Ok(space.clone());
+    /// The space inside a shape or a node that stands in `space`. What moves or deforms is a group of its own.
+    fn inside(&mut self, properties: &Properties<'a>, space: &Space<'a>) -> Result<Space<'a>> {
+        let own = Placement::of(properties)?;
+        let still = Space {
+            outer: space.outer * own.first,
+            ..space.clone()
+        };
+        if own.moving.is_none() && !shape::deforms(properties) {
+            return Ok(still);
         }
         if let Some(group) = space.shapegroup {
             let message = "what is in a shapegroup cannot move by itself, nor deform";
@@ -260,41 +257,25 @@ impl<'a> Plan<'a> {
                 .related(group.location(), "the group"));
         }
         self.group_count += 1;
-        if moving.is_none() {
+        let group = self.group_count;
+        let Some(moving) = own.moving else {
             // It moves with what is around it, and has a tree of its own.
-            self.instances.push(Instance {
-                to_world: space.motion.clone().unwrap_or(Moving::IDENTITY),
-                group: self.group_count,
-            });
-            return Ok(Space {
-                group: self.group_count,
-                ..space.clone()
-            });
-        }
-        let motion = self.motion(properties, space, &DMat4::IDENTITY, moving.as_ref())?;
+            let to_world = space.motion.clone().unwrap_or(Moving::IDENTITY);
+            self.instances.push(Instance { to_world, group });
+            return Ok(Space { group, ..still });
+        };
+        let Unscaled { scale, moving } =
+            Moving::unscaled(space.motion.as_ref(), &space.outer, &moving)
+                .ok_or_else(|| not_invertible(properties))?;
         self.instances.push(Instance {
-            to_world: motion.clone(),
-            group: self.group_count,
+            to_world: moving.clone(),
+            group,
         });
         Ok(Space {
-            group: self.group_count,
-            motion: Some(motion),
-            outer: DMat4::IDENTITY,
-            ..space.clone()
-        })
-    }
-
-    /// The product of all that is around what `properties` name, of `still` and of `moving`.
-    fn motion(
-        &self,
-        properties: &Properties<'a>,
-        space: &Space<'a>,
-        still: &DMat4,
-        moving: Option<&Moving>,
-    ) -> Result<Moving> {
-        let still = space.outer * *still;
-        Moving::product(space.motion.as_ref(), &still, moving).ok_or_else(|| {
-            properties.error("to_world", "the transform must be affine and invertible")
+            group,
+            motion: Some(moving),
+            outer: scale,
+            ..still
         })
     }
 
@@ -340,11 +321,20 @@ impl<'a> Plan<'a> {
                 .related(group.location(), "this"));
         }
         let own = Placement::of(properties)?;
-        let to_world = self.motion(properties, space, &own.still, own.moving.as_ref())?;
+        let between = match own.moving {
+            Some(_) => space.outer,
+            None => space.outer * own.first,
+        };
+        let to_world = Moving::product(space.motion.as_ref(), &between, own.moving.as_ref())
+            .ok_or_else(|| not_invertible(properties))?;
         let group = self.shapegroup(group);
         self.instances.push(Instance { to_world, group });
         Ok(())
     }
+}
+
+fn not_invertible(properties: &Properties<'_>) -> Error {
+    properties.error("to_world", "the transform must be affine and invertible")
 }
 
 impl Space<'_> {
@@ -387,6 +377,37 @@ mod tests {
         assert_eq!(of, [1, 1, 2]);
         assert_eq!(assets.instances[1].to_world.at(0.0).translation().x, 3.0);
         assert_eq!(assets.primitive_count(), 12 + 1 + 1 + 1);
+    }
+
+    #[test]
+    fn what_moves_is_built_with_the_scale_of_all_that_is_around_it() {
+        let groups = [
+            r#"<scale value="3"/>"#,
+            r#"<rotate z="1" angle="30"/><scale value="-2"/>"#,
+            // A shear: there is no scale apart.
+            r#"<scale x="4" y="-1"/>"#,
+        ];
+        for group in groups {
+            let with = |to_world: String| {
+                let assets = load(&format!(
+                    r#"<shape type="group"><transform name="to_world">{group}</transform>
+                       <shape type="rectangle">{to_world}</shape></shape>"#
+                ));
+                assets.unwrap().shapes.remove(0)
+            };
+            let first = r#"<scale x="2"/><rotate z="1" angle="45"/><translate x="1"/>"#;
+            let still = with(format!(r#"<transform name="to_world">{first}</transform>"#));
+            let moves = with(format!(
+                r#"<animation name="to_world"><transform time="1">{first}</transform>
+                   <transform time="2"><scale value="5"/></transform></animation>"#
+            ));
+            let (area, expected) = (moves.geometry.area(), still.geometry.area());
+            assert!((area - expected).abs() < 1e-5 * expected, "{group}: {area}");
+            let at = moves.motion.unwrap().at(1.0);
+            let round = at.linear().transpose() * at.linear();
+            assert!(round.abs_diff_eq(glam::Mat3::IDENTITY, 1e-5), "{group}");
+            assert!(at.linear().determinant() > 0.0, "{group}");
+        }
     }
 
     #[test]

@@ -127,6 +127,7 @@ mod tests {
 
     use super::*;
     use crate::description::{Description, Kind, Options};
+    use crate::shape::Placement;
 
     const PLY: &str = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
         element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
@@ -149,11 +150,16 @@ mod tests {
         let path = folder.path().join("scene.xml");
         let scene = Description::parse(SHAPES, &path, &Options::default()).unwrap();
         let shapes = scene.root().children(Kind::Shape);
-        let site = |properties| Site {
+        let place = |properties| Placement::of(&shape::declared(properties).unwrap());
+        let places: Vec<_> = shapes.iter().map(|p| place(p).unwrap().first).collect();
+        let site = |(properties, to_world): (_, &_)| Site {
             properties,
-            setting: Setting::default(),
+            setting: Setting {
+                to_world: *to_world,
+                cache: None,
+            },
         };
-        let sites: Vec<Site<'_>> = shapes.iter().map(site).collect();
+        let sites: Vec<Site<'_>> = shapes.iter().zip(&places).map(site).collect();
         let count = AtomicUsize::new(0);
         let shared = build(&sites, None, &|place| {
             assert!(place < sites.len());

@@ -35,12 +35,12 @@ pub(super) const PLUGIN: Plugin = Plugin {
     ],
 };
 
-pub(super) fn build(properties: &Properties<'_>, outer: &DMat4) -> Result<Shape> {
+pub(super) fn build(properties: &Properties<'_>, to_world: &DMat4) -> Result<Shape> {
     let basis = Basis {
         points: 4,
         name: "a B-spline",
     };
-    let text = read(properties, outer, basis)?;
+    let text = read(properties, to_world, basis)?;
     let curves = BsplineCurves {
         curves: text.curves,
     };

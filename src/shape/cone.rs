@@ -25,9 +25,9 @@ pub(super) const PLUGIN: Plugin = Plugin {
     ],
 };
 
-pub(super) fn build(properties: &Properties<'_>, outer: &DMat4) -> Result<Shape> {
+pub(super) fn build(properties: &Properties<'_>, to_world: &DMat4) -> Result<Shape> {
     let base = properties.boolean("base")?;
     let closed = if base { vec![0.0] } else { Vec::new() };
     let slope = -1.0;
-    frustum::build(properties, outer, Profile { slope, closed })
+    frustum::build(properties, to_world, Profile { slope, closed })
 }

@@ -5,9 +5,7 @@ use std::f32::consts::TAU;
 
 use glam::{DAffine3, DMat4, Vec2, Vec3};
 
-use super::{
-    Bounds, Chart, Geometry, Shape, Surface, SurfaceSample, area_to_solid_angle, to_world,
-};
+use super::{Bounds, Chart, Geometry, Shape, Surface, SurfaceSample, area_to_solid_angle};
 use crate::description::Properties;
 use crate::description::declared::Plugin;
 use crate::error::Result;
@@ -31,8 +29,8 @@ pub(super) const PLUGIN: Plugin = Plugin {
     properties: &[super::COMMON, &[super::FLIP_NORMALS]],
 };
 
-pub(super) fn build(properties: &Properties<'_>, outer: &DMat4) -> Result<Shape> {
-    let to_world = DAffine3::from_mat4(to_world(properties, outer)?);
+pub(super) fn build(properties: &Properties<'_>, to_world: &DMat4) -> Result<Shape> {
+    let to_world = DAffine3::from_mat4(*to_world);
     let flip = properties.boolean("flip_normals")?;
     match Disk::new(to_world, flip) {
         Some(disk) => Ok(Geometry::Disk(disk).into()),

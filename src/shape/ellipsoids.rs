@@ -7,7 +7,7 @@ mod shell;
 
 use glam::{DAffine3, DMat3, DMat4, DQuat, DVec3, Vec2, Vec3};
 
-use super::{Bounds, Geometry, Shape, Surface, to_world};
+use super::{Bounds, Geometry, Shape, Surface};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, Row, boolean, choice, file, float};
 use crate::error::Result;
@@ -67,23 +67,23 @@ pub(super) const MESH_PLUGIN: Plugin = Plugin {
     ],
 };
 
-pub(super) fn build(properties: &Properties<'_>, outer: &DMat4) -> Result<Shape> {
-    load(properties, outer, None)
+pub(super) fn build(properties: &Properties<'_>, to_world: &DMat4) -> Result<Shape> {
+    load(properties, to_world, None)
 }
 
-pub(super) fn build_mesh(properties: &Properties<'_>, outer: &DMat4) -> Result<Shape> {
+pub(super) fn build_mesh(properties: &Properties<'_>, to_world: &DMat4) -> Result<Shape> {
     let shell = Shell::named(properties.choice("shell")?);
-    load(properties, outer, Some(shell))
+    load(properties, to_world, Some(shell))
 }
 
 /// What is least opaque reaches nowhere.
 const FAINTEST: f64 = 0.01;
 
-fn load(properties: &Properties<'_>, outer: &DMat4, shell: Option<Shell>) -> Result<Shape> {
+fn load(properties: &Properties<'_>, to_world: &DMat4, shell: Option<Shell>) -> Result<Shape> {
     let path = properties.file("filename")?;
     let read = read::read(&path, properties.budget());
     let read = read.map_err(|e| e.named_at(properties.location()))?;
-    let to_world = DAffine3::from_mat4(to_world(properties, outer)?);
+    let to_world = DAffine3::from_mat4(*to_world);
     let Some((turned, scaled, uneven)) = parts(to_world.matrix3) else {
         let message = "the transform of ellipsoids must be finite and invertible";
         return Err(properties.error("to_world", message));

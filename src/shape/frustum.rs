@@ -38,9 +38,12 @@ pub(super) struct Profile {
     pub(super) closed: Vec<f64>,
 }
 
-/// Builds the frustum from `p0`, the centre of the end of the given `radius`, to `p1`, under `outer` and
-/// `to_world`.
-pub(super) fn build(properties: &Properties<'_>, outer: &DMat4, profile: Profile) -> Result<Shape> {
+/// Builds the frustum from `p0`, the centre of the end of the given `radius`, to `p1`, under `to_world`.
+pub(super) fn build(
+    properties: &Properties<'_>,
+    to_world: &DMat4,
+    profile: Profile,
+) -> Result<Shape> {
     let plugin = properties.plugin();
     let (p0, p1) = (properties.vector("p0")?, properties.vector("p1")?);
     let radius = properties.float("radius")?;
@@ -52,7 +55,7 @@ pub(super) fn build(properties: &Properties<'_>, outer: &DMat4, profile: Profile
     let t = axis.cross(s).normalize();
     let s = t.cross(axis);
     let placed = DAffine3::from_cols(radius * s, radius * t, p1 - p0, p0);
-    let to_world = DAffine3::from_mat4(super::to_world(properties, outer)?) * placed;
+    let to_world = DAffine3::from_mat4(*to_world) * placed;
     let flip = properties.boolean("flip_normals")?;
     match Frustum::new(to_world, profile, flip) {
         Some(frustum) => Ok(Geometry::Frustum(frustum).into()),

@@ -34,12 +34,12 @@ pub(super) const PLUGIN: Plugin = Plugin {
     ],
 };
 
-pub(super) fn build(properties: &Properties<'_>, outer: &DMat4) -> Result<Shape> {
+pub(super) fn build(properties: &Properties<'_>, to_world: &DMat4) -> Result<Shape> {
     let basis = Basis {
         points: 2,
         name: "a linear curve",
     };
-    let text = read(properties, outer, basis)?;
+    let text = read(properties, to_world, basis)?;
     let curves = LinearCurves {
         curves: text.curves,
     };

@@ -11,7 +11,7 @@ use glam::{DMat4, Vec2, Vec3};
 use super::quad::{Place, Quad, Seen};
 use super::{
     Bounds, Chart, Geometry, Setting, Shape, Surface, SurfaceSample, SurfaceSamples,
-    area_to_solid_angle, area_to_solid_angles, to_world,
+    area_to_solid_angle, area_to_solid_angles,
 };
 use crate::description::Properties;
 use crate::error::Result;
@@ -331,21 +331,20 @@ impl Surface for TriangleMesh {
     }
 }
 
-/// Puts a mesh into the world as its shape says: `to_world`, `face_normals`, `flip_normals`.
-pub(super) fn place(mesh: Mesh, properties: &Properties<'_>, outer: &DMat4) -> Result<Shape> {
+/// Puts a mesh into the world as its shape says: `face_normals`, `flip_normals`.
+pub(super) fn place(mesh: Mesh, properties: &Properties<'_>, to_world: &DMat4) -> Result<Shape> {
     let setting = Setting {
-        outer: *outer,
+        to_world: *to_world,
         cache: None,
     };
     place_in(&setting, mesh, properties)
 }
 
 fn place_in(setting: &Setting<'_>, mut mesh: Mesh, properties: &Properties<'_>) -> Result<Shape> {
-    let to_world = to_world(properties, &setting.outer)?;
     let mut dropped = 0;
     let (mut hash, mut uncached) = (None, None);
-    if to_world != DMat4::IDENTITY {
-        mesh.transform(&to_world);
+    if setting.to_world != DMat4::IDENTITY {
+        mesh.transform(&setting.to_world);
         // A transform can carry finite corners to infinity.
         dropped = mesh.check().dropped_triangles;
     }

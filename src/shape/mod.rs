@@ -42,7 +42,6 @@ use crate::family;
 use crate::interaction::{Hit, Interaction, Ray, offset};
 use crate::lanes::{self, Lanes, Mask as _};
 use crate::math::Moving;
-use crate::math::moving::Pose;
 use crate::mesh::{Loaded, Mesh, MeshFile, ReadOptions, Time, read};
 use deforming::Sets;
 
@@ -300,7 +299,7 @@ impl From<Geometry> for Shape {
 
 /// How a plugin comes to its shape.
 enum Build {
-    /// By itself, in groups whose transforms make up the matrix.
+    /// By itself, in the place that the matrix says.
     Made(fn(&Properties<'_>, &DMat4) -> Result<Shape>),
     /// From the file `filename`, which is read with these options.
     Read(fn(&Properties<'_>) -> Result<ReadOptions>),
@@ -505,16 +504,25 @@ pub(crate) fn declared<'a>(properties: &Properties<'a>) -> Result<Properties<'a>
     family::declared(properties, plugins())
 }
 
-/// Builds the shape that `properties` names.
+/// Builds the shape that `properties` names; one that moves stands where its first keyframe has it.
 pub fn build(properties: &Properties<'_>) -> Result<Shape> {
-    build_within(&Setting::default(), properties)
+    let properties = &declared(properties)?;
+    let to_world = match single(properties) {
+        Some(_) => Placement::of(properties)?.first,
+        None => DMat4::IDENTITY,
+    };
+    let setting = Setting {
+        to_world,
+        cache: None,
+    };
+    build_within(&setting, properties)
 }
 
 /// Where a shape is built.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub struct Setting<'a> {
-    /// From the space in which it stands to the world's.
-    pub outer: DMat4,
+    /// From the shape's own space to that in which it stands still, whatever its property `to_world` says.
+    pub to_world: DMat4,
     /// A folder for what takes long to compute of a large mesh.
     pub cache: Option<&'a Path>,
 }
@@ -523,7 +531,7 @@ pub struct Setting<'a> {
 pub fn build_within(setting: &Setting<'_>, properties: &Properties<'_>) -> Result<Shape> {
     let properties = &declared(properties)?;
     match single(properties) {
-        Some(Build::Made(build)) => build(properties, &setting.outer),
+        Some(Build::Made(build)) => build(properties, &setting.to_world),
         Some(Build::Read(options)) => {
             let file = mesh::file(properties, options(properties)?)?;
             let loaded = read(&file.path, &file.options, properties.budget());
@@ -602,66 +610,29 @@ pub(crate) fn deforms(properties: &Properties<'_>) -> bool {
     from_file && Sets::of(properties).is_ok_and(|sets| sets.deform())
 }
 
-/// The property `to_world`, the identity by default, and then `outer`.
-fn to_world(properties: &Properties<'_>, outer: &DMat4) -> Result<DMat4> {
-    Ok(*outer * Placement::of_shape(properties)?.still)
-}
-
 /// The property `to_world` of a shape.
 #[derive(Clone, Debug)]
 pub struct Placement {
-    /// What stands still: the whole, unless it moves.
-    pub still: DMat4,
-    /// What moves, around that.
+    /// Where it stands: at its first keyframe, if it moves.
+    pub first: DMat4,
+    /// How it moves, if it does.
     pub moving: Option<Moving>,
 }
 
 impl Placement {
-    /// Of a shape: of one that moves the scale of the first keyframe stands still. So a shape is built as if it stood, for
-    /// which scales may mean more than space: the radii of curves are not scaled, and mirrored triangles have their sides swapped.
-    ///
-    /// # Errors
-    /// Where it makes no motion.
-    pub fn of_shape(properties: &Properties<'_>) -> Result<Self> {
-        let whole = Self::of(properties)?;
-        let keyframes = properties.animation("to_world")?;
-        let (Some(_), Some(keyframes)) = (&whole.moving, keyframes) else {
-            return Ok(whole);
-        };
-        let scale = Pose::new(&keyframes[0].1).map(|pose| pose.scale());
-        let scale = scale.map_err(|why| properties.error("to_world", why.to_string()))?;
-        let rest = DMat4::from_scale(scale.recip());
-        let moving: Vec<_> = (keyframes.iter())
-            .map(|(time, matrix)| (*time, *matrix * rest))
-            .collect();
-        let moving = Moving::new(&moving);
-        Ok(Self {
-            still: DMat4::from_scale(scale),
-            moving: Some(moving.map_err(|why| properties.error("to_world", why.to_string()))?),
-        })
-    }
-
-    /// Of what `properties` name; what stands still is the identity where anything moves.
+    /// Of what `properties` name.
     ///
     /// # Errors
     /// Where it makes no motion.
     pub fn of(properties: &Properties<'_>) -> Result<Self> {
-        let Some(keyframes) = properties.animation("to_world")? else {
-            let still = properties.transform("to_world")?;
-            return Ok(Self {
-                still,
-                moving: None,
-            });
-        };
-        let moving = properties.motion("to_world")?;
-        Ok(match moving.is_still() {
-            true => Self {
-                still: keyframes[0].1,
+        Ok(match properties.animation("to_world")? {
+            None => Self {
+                first: properties.transform("to_world")?,
                 moving: None,
             },
-            false => Self {
-                still: DMat4::IDENTITY,
-                moving: Some(moving),
+            Some(keyframes) => Self {
+                first: keyframes[0].1,
+                moving: Some(properties.motion("to_world")?).filter(|moving| !moving.is_still()),
             },
         })
     }

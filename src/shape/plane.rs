@@ -4,7 +4,7 @@
 
 use glam::{DAffine3, DMat4, DVec3, Vec2, Vec3};
 
-use super::{Bounds, Geometry, Shape, Surface, SurfaceSample, rounding, to_world};
+use super::{Bounds, Geometry, Shape, Surface, SurfaceSample, rounding};
 use crate::description::Properties;
 use crate::description::declared::Plugin;
 use crate::error::Result;
@@ -25,8 +25,8 @@ pub(super) const PLUGIN: Plugin = Plugin {
     properties: &[super::COMMON, &[super::FLIP_NORMALS]],
 };
 
-pub(super) fn build(properties: &Properties<'_>, outer: &DMat4) -> Result<Shape> {
-    let to_world = DAffine3::from_mat4(to_world(properties, outer)?);
+pub(super) fn build(properties: &Properties<'_>, to_world: &DMat4) -> Result<Shape> {
+    let to_world = DAffine3::from_mat4(*to_world);
     let to_local = to_world.inverse();
     let flip = properties.boolean("flip_normals")?;
     // By the inverse transpose, whose rows are the columns here.

@@ -33,7 +33,7 @@ pub(super) const PLUGIN: Plugin = Plugin {
     ],
 };
 
-pub(super) fn build(properties: &Properties<'_>, outer: &DMat4) -> Result<Shape> {
+pub(super) fn build(properties: &Properties<'_>, to_world: &DMat4) -> Result<Shape> {
     let corners = corners(properties)?;
     let located = |error: Error| error.at(properties.location());
     let normal = plane(&corners).map_err(located)?;
@@ -65,7 +65,7 @@ pub(super) fn build(properties: &Properties<'_>, outer: &DMat4) -> Result<Shape>
         triangles,
         ..Mesh::default()
     };
-    place(mesh, properties, outer)
+    place(mesh, properties, to_world)
 }
 
 /// `p0`, `p1` and so on.

@@ -13,6 +13,6 @@ pub(super) const PLUGIN: Plugin = Plugin {
     properties: &[super::COMMON, super::MESH],
 };
 
-pub(super) fn build(properties: &Properties<'_>, outer: &DMat4) -> Result<Shape> {
-    place(mesh::rectangle(), properties, outer)
+pub(super) fn build(properties: &Properties<'_>, to_world: &DMat4) -> Result<Shape> {
+    place(mesh::rectangle(), properties, to_world)
 }

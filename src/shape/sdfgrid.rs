@@ -7,7 +7,7 @@
 
 use glam::{DAffine3, DMat4, DVec3, UVec3, Vec2, Vec3};
 
-use super::{Bounds, Geometry, Shape, Surface, rounding, to_world};
+use super::{Bounds, Geometry, Shape, Surface, rounding};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, choice, file};
 use crate::error::Result;
@@ -51,7 +51,7 @@ pub(super) const PLUGIN: Plugin = Plugin {
     ],
 };
 
-pub(super) fn build(properties: &Properties<'_>, outer: &DMat4) -> Result<Shape> {
+pub(super) fn build(properties: &Properties<'_>, to_world: &DMat4) -> Result<Shape> {
     let path = properties.file("filename")?;
     let grid = vol::read(&path, properties.budget());
     let grid = grid.map_err(|e| e.named_at(properties.location()))?;
@@ -68,7 +68,7 @@ pub(super) fn build(properties: &Properties<'_>, outer: &DMat4) -> Result<Shape>
         let error = properties.error("filename", message);
         return Err(error.help("two points at least are needed along each axis"));
     }
-    let matrix = to_world(properties, outer)?;
+    let matrix = *to_world;
     let placed =
         Transform::new(&matrix).filter(|_| DAffine3::from_mat4(matrix).inverse().is_finite());
     let Some(placed) = placed else {

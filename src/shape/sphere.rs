@@ -10,7 +10,7 @@ use glam::{DMat4, DVec3, Mat3, Vec2, Vec3};
 
 use super::{
     Bounds, Chart, Geometry, Shape, Surface, SurfaceSample, SurfaceSamples, area_to_solid_angle,
-    area_to_solid_angles, to_world,
+    area_to_solid_angles,
 };
 use crate::description::Properties;
 use crate::description::declared::{Plugin, float, vector};
@@ -46,8 +46,7 @@ pub(super) const PLUGIN: Plugin = Plugin {
     ],
 };
 
-pub(super) fn build(properties: &Properties<'_>, outer: &DMat4) -> Result<Shape> {
-    let to_world = to_world(properties, outer)?;
+pub(super) fn build(properties: &Properties<'_>, to_world: &DMat4) -> Result<Shape> {
     let center = properties.vector("center")?;
     let radius = properties.float("radius")?;
     // A negative radius is a scale: it mirrors.

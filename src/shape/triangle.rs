@@ -32,7 +32,7 @@ pub(super) const PLUGIN: Plugin = Plugin {
     ],
 };
 
-pub(super) fn build(properties: &Properties<'_>, outer: &DMat4) -> Result<Shape> {
+pub(super) fn build(properties: &Properties<'_>, to_world: &DMat4) -> Result<Shape> {
     let corner = |name| properties.vector(name);
     let [a, b, c] = [corner("p0")?, corner("p1")?, corner("p2")?];
     if (b - a).cross(c - a) == DVec3::ZERO {
@@ -49,7 +49,7 @@ pub(super) fn build(properties: &Properties<'_>, outer: &DMat4) -> Result<Shape>
         triangles: vec![[0, 1, 2]],
         ..Mesh::default()
     };
-    place(mesh, properties, outer)
+    place(mesh, properties, to_world)
 }
 
 /// `n0`, `n1` and `n2`, or none.

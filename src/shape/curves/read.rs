@@ -15,14 +15,13 @@ pub(in crate::shape) struct Text {
     pub(in crate::shape) warnings: Vec<Problem>,
 }
 
-/// The curves of the file `filename`, under `to_world` and `outer`. Radii stay as they are.
+/// The curves of the file `filename`, under `to_world`. Radii stay as they are.
 pub(in crate::shape) fn read(
     properties: &Properties<'_>,
-    outer: &DMat4,
+    to_world: &DMat4,
     basis: Basis,
 ) -> Result<Text> {
     let path = properties.file("filename")?;
-    let to_world = super::super::to_world(properties, outer)?;
     let refused = |e: std::io::Error| Error::system("read", &path, &e);
     let file = crate::file::open(&path).map_err(refused)?;
     let length = file.metadata().map_err(refused)?.len();
@@ -32,7 +31,7 @@ pub(in crate::shape) fn read(
     (account.take(length.saturating_mul(4))).map_err(located)?;
     let mut text = Vec::new();
     (file.take(length).read_to_end(&mut text)).map_err(refused)?;
-    let read = parse(&text, &path, &to_world, basis)?;
+    let read = parse(&text, &path, to_world, basis)?;
     account.keep(read.curves.bytes() as u64);
     Ok(read)
 }
