@@ -7,6 +7,7 @@ use std::fmt::Write as _;
 
 use glam::{DVec3, Vec3};
 
+use super::staging::placed;
 use crate::mesh::{GltfLight, GltfLightKind};
 
 /// A light's position, direction, and an axis beside that.
@@ -78,24 +79,6 @@ pub(super) fn emitters(lights: &[Vec<GltfLight>], moments: &[f32]) -> String {
 fn lookat(origin: DVec3, target: DVec3, up: DVec3) -> String {
     let [origin, target, up] = [origin, target, up].map(|p| format!("{}, {}, {}", p.x, p.y, p.z));
     format!(r#"<lookat origin="{origin}" target="{target}" up="{up}"/>"#)
-}
-
-/// The property `to_world` of what stands in `places` at some `moments`: `one` says one of them.
-pub(super) fn placed<P: PartialEq>(
-    places: &[P],
-    moments: &[f32],
-    one: impl Fn(&P) -> String,
-) -> String {
-    let first = &places[0];
-    if places.iter().all(|place| place == first) {
-        return format!(r#"<transform name="to_world">{}</transform>"#, one(first));
-    }
-    let keyframes = moments
-        .iter()
-        .zip(places)
-        .map(|(time, place)| format!(r#"<transform time="{time}">{}</transform>"#, one(place)));
-    let keyframes: String = keyframes.collect();
-    format!(r#"<animation name="to_world">{keyframes}</animation>"#)
 }
 
 /// What to say where white paper in the middle of the mesh would be far darker or brighter than a picture's white.

@@ -22,7 +22,7 @@ use crate::mesh::{
 };
 use crate::shape::Bounds;
 use frame::FOV;
-use staging::point;
+use staging::{placed, point};
 use surface::Body;
 
 pub use staging::{Background, Finish, Lighting, Staging, UpAxis};
@@ -379,7 +379,7 @@ fn scene(subject: &Subject<'_>, file: &Path, bare: bool) -> String {
                 let rows = rows.map(|v| v.to_string()).join(" ");
                 format!(r#"<matrix value="{rows}"/>"#)
             };
-            let to_world = lights::placed(&camera.to_world, staging.moments(), matrix);
+            let to_world = placed(&camera.to_world, staging.moments(), matrix);
             match camera.fov_y {
                 Some(fov) => ("perspective", field(fov, "y"), to_world),
                 None => ("orthographic", String::new(), to_world),

@@ -325,3 +325,21 @@ pub(super) fn filename(path: &Path) -> String {
 pub(super) fn point(p: Vec3) -> String {
     format!("{}, {}, {}", p.x, p.y, p.z)
 }
+
+/// The property `to_world` of what stands in `places` at some `moments`: `one` says one of them.
+pub(super) fn placed<P: PartialEq>(
+    places: &[P],
+    moments: &[f32],
+    one: impl Fn(&P) -> String,
+) -> String {
+    let first = &places[0];
+    if places.iter().all(|place| place == first) {
+        return format!(r#"<transform name="to_world">{}</transform>"#, one(first));
+    }
+    let keyframes = moments
+        .iter()
+        .zip(places)
+        .map(|(time, place)| format!(r#"<transform time="{time}">{}</transform>"#, one(place)));
+    let keyframes: String = keyframes.collect();
+    format!(r#"<animation name="to_world">{keyframes}</animation>"#)
+}
