@@ -69,7 +69,8 @@ impl Subject<'_> {
         let options = self.read.options(None);
         let (mut session, budget) = (Session::default(), Budget::default());
         let staging = Staging::default();
-        let (mut description, _) = describe(scene, &staging, &options, &budget, &mut session)?;
+        let mut description =
+            describe(scene, &staging, &options, &budget, &mut session)?.description;
         self.image.overrides().apply(&mut description);
         let sensor = match self.image.sensor()? {
             Some(named) => find_sensor(&description, &named)?,

@@ -15,8 +15,8 @@ use etendue::image;
 use etendue::lanes::Kernel;
 use etendue::mesh::{GltfAnimation, read_gltf_animation};
 use etendue::render::{
-    Adaptive, Checkpoint, Options, Outline, Overrides, Passes, Picture, Progress, Rendered,
-    Session, Staging, is_current, is_mesh, is_part, outline, sensors,
+    Adaptive, Checkpoint, Framing, Options, Outline, Overrides, Passes, Picture, Progress,
+    Rendered, Session, Staging, is_current, is_mesh, is_part, outline, sensors,
 };
 use glam::DVec3;
 use serde_json::json;
@@ -29,7 +29,7 @@ use super::output::Names;
 use super::overrides::{IMAGE, ImageArguments};
 use super::parse::{self, Frames};
 use super::progress::{self, Take, Takers, Told, Voice, Watch};
-use super::scene::{SceneArguments, describe};
+use super::scene::{Described, SceneArguments, describe};
 use super::staging::StagingArguments;
 use super::stereo::Eye;
 use super::stop::Stop;
@@ -451,6 +451,8 @@ struct Series<'a> {
     session: Session,
     /// The bare mesh that was read last, and how: its frames need it read but once.
     read: Option<(PathBuf, description::Options, Description)>,
+    /// What was framed of the animated mesh that was read last.
+    framed: Option<(PathBuf, Framing)>,
     /// Found out before anything is loaded, for a scene in memory counts as taken.
     budget: Budget,
     /// Warnings that were told already.
@@ -500,6 +502,7 @@ impl<'a> Series<'a> {
             arguments,
             session: Session::default(),
             read: None,
+            framed: None,
             budget,
             told: Vec::new(),
             stop,
@@ -693,12 +696,19 @@ impl<'a> Series<'a> {
         }
         let turns = self.arguments.turntable.is_some();
         let (arguments, up) = (&self.arguments.staging, scene.up_axis());
+        let framed = (self.framed.take()).filter(|(path, _)| *path == item.input);
         let staging = Staging {
             animation,
+            framing: framed.map(|(_, framing)| framing),
             ..arguments.staging(up, &self.arguments.image.overrides(), turns)
         };
         let (budget, session) = (&self.budget, &mut self.session);
-        let (mut description, text) = describe(&item.input, &staging, &options, budget, session)?;
+        let Described {
+            mut description,
+            text,
+            framing,
+        } = describe(&item.input, &staging, &options, budget, session)?;
+        self.framed = framing.map(|framing| (item.input.clone(), framing));
         if let (Some(path), Some(text)) = (&arguments.write_scene, text) {
             let names = Names {
                 input: &item.input,

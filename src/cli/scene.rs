@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use etendue::budget::Budget;
 use etendue::description::{Description, Options};
 use etendue::error::{Error, Result};
-use etendue::render::{self, BareMesh, Session, Staging, UpAxis};
+use etendue::render::{self, BareMesh, Framing, Session, Staging, UpAxis};
 
 use super::output::with_frame;
 use super::parse;
@@ -99,8 +99,7 @@ impl SceneArguments {
             up: self.up_axis(),
             ..Staging::default()
         };
-        let (description, _) = describe(input, &staging, options, budget, session)?;
-        Ok(description)
+        Ok(describe(input, &staging, options, budget, session)?.description)
     }
 
     /// Which way is up in a bare mesh.
@@ -113,15 +112,24 @@ impl SceneArguments {
     }
 }
 
-/// The scene in the file, or around the mesh in it, which is shown as asked for and told as text too. What is read may
-/// take that much memory; the session has the mesh then.
+/// A scene as it is read.
+pub(super) struct Described {
+    pub(super) description: Description,
+    /// As text, where it is one around a mesh.
+    pub(super) text: Option<String>,
+    /// What was framed of an animated mesh.
+    pub(super) framing: Option<Framing>,
+}
+
+/// The scene in the file, or around the mesh in it, which is shown as asked for. What is read may take that much memory; the
+/// session has the mesh then.
 pub(super) fn describe(
     input: &Path,
     staging: &Staging,
     options: &Options,
     budget: &Budget,
     session: &mut Session,
-) -> Result<(Description, Option<String>)> {
+) -> Result<Described> {
     check(input)?;
     if render::is_mesh(input) {
         render::check_mesh(input, budget.limit())?;
@@ -129,11 +137,20 @@ pub(super) fn describe(
             description,
             text,
             mesh,
+            framing,
         } = render::describe_mesh(input, staging, options, budget)?;
         session.give(mesh);
-        return Ok((description, Some(text)));
+        return Ok(Described {
+            description,
+            text: Some(text),
+            framing,
+        });
     }
-    Ok((Description::read(input, options, budget)?, None))
+    Ok(Described {
+        description: Description::read(input, options, budget)?,
+        text: None,
+        framing: None,
+    })
 }
 
 /// Refuses what is neither a scene nor a mesh by its name.

@@ -88,6 +88,7 @@ impl StagingArguments {
             background: self.background.clone(),
             ground: !self.no_ground,
             animation: None,
+            framing: None,
         }
     }
 }

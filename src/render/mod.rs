@@ -48,7 +48,9 @@ use crate::image::{Image, Metadata, Window};
 use crate::integrator::Stats;
 
 pub use adaptive::AdaptiveReport;
-pub use bare::{Background, BareMesh, Finish, Lighting, Staging, UpAxis, describe_mesh, is_mesh};
+pub use bare::{
+    Background, BareMesh, Finish, Framing, Lighting, Staging, UpAxis, describe_mesh, is_mesh,
+};
 pub use foveated::FoveatedReport;
 pub use heat::Heat;
 pub use info::{NamedFile, SceneInfo, SensorInfo};

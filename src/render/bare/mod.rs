@@ -60,6 +60,39 @@ pub struct BareMesh {
     pub text: String,
     /// The mesh: give it to the [`Session`](super::Session), and it is not read again.
     pub mesh: ReadMesh,
+    /// What was framed of an animated file: the [`Staging`] of its next image takes it, and it is not looked at again.
+    pub framing: Option<Framing>,
+}
+
+/// What a camera sees that stands still from one image of an animated file to the next.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Framing {
+    /// Around the mesh at all times.
+    all: Bounds,
+    /// Those of its boxes at some times.
+    corners: Vec<Vec3>,
+    /// Whether a triangle has an area at any of them.
+    area: bool,
+}
+
+impl Framing {
+    fn of(times: Vec<f32>, mut at: impl FnMut(f32) -> Result<Mesh>) -> Result<Self> {
+        let mut framing = Self {
+            all: Bounds::EMPTY,
+            corners: Vec::new(),
+            area: false,
+        };
+        for time in times {
+            let mesh = at(time)?;
+            framing.area |= has_area(&mesh);
+            if let Some((min, max)) = mesh.bounds() {
+                let seen = Bounds { min, max };
+                framing.all = framing.all.union(seen);
+                framing.corners.extend(seen.corners());
+            }
+        }
+        Ok(framing)
+    }
 }
 
 /// A scene around the mesh in `path`, which is read within the budget.
@@ -102,21 +135,34 @@ pub fn describe_mesh(
         );
         tell(&mut loaded, path, message);
     }
-    // A camera that sees all of an animation stands still from one image to the next.
-    let (mut all, mut corners, mut area) = (Bounds::EMPTY, Vec::new(), has_area(&loaded.mesh));
-    for time in staging.animation.iter().flat_map(looks) {
-        let looked_at = read(path, &at(Some(time)), budget)?.mesh;
-        area |= has_area(&looked_at);
-        if let Some((min, max)) = looked_at.bounds() {
-            let seen = Bounds { min, max };
-            all = all.union(seen);
-            corners.extend(seen.corners());
-        }
-    }
-    let bounds = match all.is_empty() {
-        true => bounds,
-        false => (all.min, all.max),
+    let settings = match plugin {
+        "gltf" => read_gltf_settings(path, staging.moments(), budget)?,
+        _ => vec![GltfSetting::default()],
     };
+    let (mut cameras, mut lights, mut warnings) = (Vec::new(), Vec::new(), Vec::new());
+    for setting in settings {
+        cameras.extend(setting.camera.filter(|_| !staging.asks_for_camera()));
+        lights.push(setting.lights);
+        warnings = setting.warnings;
+    }
+    let camera = own_camera(&cameras, staging.aspect());
+    let (mut framing, mut area) = (None, has_area(&loaded.mesh));
+    if let Some(animation) = &staging.animation {
+        let is_lit = staging.lighting == Lighting::Auto && !lights[0].is_empty();
+        let needless = camera.is_some() && is_lit && !staging.has_ground() && area;
+        framing = match &staging.framing {
+            Some(known) => Some(known.clone()),
+            None if needless => None,
+            None => Some(Framing::of(looks(animation), |time| {
+                Ok(read(path, &at(Some(time)), budget)?.mesh)
+            })?),
+        };
+    }
+    let bounds = match &framing {
+        Some(Framing { all, .. }) if !all.is_empty() => (all.min, all.max),
+        _ => bounds,
+    };
+    area |= framing.as_ref().is_some_and(|framing| framing.area);
     if !area {
         let message = "none of the triangles has an area: there is nothing to see";
         return Err(Error::input(message).at(&Location::of_file(path)));
@@ -148,16 +194,6 @@ pub fn describe_mesh(
     for message in unseen(&loaded.mesh) {
         tell(&mut loaded, path, message);
     }
-    let settings = match plugin {
-        "gltf" => read_gltf_settings(path, staging.moments(), budget)?,
-        _ => vec![GltfSetting::default()],
-    };
-    let (mut cameras, mut lights, mut warnings) = (Vec::new(), Vec::new(), Vec::new());
-    for setting in settings {
-        cameras.extend(setting.camera.filter(|_| !staging.asks_for_camera()));
-        lights.push(setting.lights);
-        warnings = setting.warnings;
-    }
     let said = if staging.lighting == Lighting::Auto {
         loaded.warnings.extend(warnings);
         let (center, radius) = frame::ball(bounds.0, bounds.1);
@@ -181,12 +217,12 @@ pub fn describe_mesh(
     let mut subject = Subject {
         plugin,
         bounds,
-        camera: own_camera(&cameras, staging.aspect()),
+        camera,
         lights: &lights,
         mesh: &loaded.mesh,
-        framed: match &corners[..] {
-            [] => &loaded.mesh.positions,
-            corners => corners,
+        framed: match &framing {
+            Some(Framing { corners, .. }) if !corners.is_empty() => corners,
+            _ => &loaded.mesh.positions,
         },
         bodies: surface::bodies(&loaded, &surfaces),
         integrator: surface::integrator(&surfaces),
@@ -236,6 +272,7 @@ pub fn describe_mesh(
         description,
         text: written,
         mesh,
+        framing,
     })
 }
 
@@ -621,6 +658,26 @@ mod tests {
             seen(Some([0.0, 1.0])),
             [0.5, 1.5].map(|x| Vec3::new(x, 0.0, 4.0)),
         );
+        // What frames it is found once, and only where the ground needs it.
+        let with = |ground: bool, framing: Option<Framing>| {
+            let animation = crate::mesh::read_gltf_animation(&path, [0.5, 0.5], &budget);
+            let staging = Staging {
+                animation: animation.unwrap(),
+                framing,
+                ground,
+                ..Staging::default()
+            };
+            describe_mesh(&path, &staging, &Options::default(), &budget).unwrap()
+        };
+        let first = with(true, None);
+        let framing = first.framing.unwrap();
+        assert_eq!(with(true, Some(framing.clone())).text, first.text);
+        let larger = Framing {
+            all: framing.all.with(Vec3::splat(-9.0)),
+            ..framing
+        };
+        assert_ne!(with(true, Some(larger)).text, first.text);
+        assert!(with(false, None).framing.is_none());
     }
 
     #[test]

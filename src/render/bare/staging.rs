@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use glam::{DVec3, Vec3};
 
-use super::lights;
+use super::{Framing, lights};
 use crate::budget::Budget;
 use crate::description::{Description, Kind, NodeId, Options, escaped};
 use crate::error::{Error, Location, Result};
@@ -121,6 +121,8 @@ pub struct Staging {
     pub ground: bool,
     /// When its file's animation is looked at, if it is.
     pub animation: Option<GltfAnimation>,
+    /// What was framed for an image of the same animated file before, if anything was.
+    pub framing: Option<Framing>,
 }
 
 impl Default for Staging {
@@ -140,6 +142,7 @@ impl Default for Staging {
             background: Background::Sky,
             ground: true,
             animation: None,
+            framing: None,
         }
     }
 }
