@@ -357,9 +357,36 @@ impl Sets {
     }
 }
 
-/// The mesh that deforms as the shapes are one after another.
+/// Turns triangles back that turned over, with their normals: where a node's scale goes through 0, its mesh goes through a
+/// plane, and what was its outside is its inside then.
+pub(super) fn keep_winding(first: &[[u32; 3]], mesh: &mut Mesh) {
+    if first.len() != mesh.triangles.len() {
+        return;
+    }
+    let mut turned = vec![false; mesh.normals.len()];
+    for (first, triangle) in first.iter().zip(&mut mesh.triangles) {
+        let [a, b, c] = *triangle;
+        if *first == [a, c, b] && b != c {
+            *triangle = *first;
+            for corner in first {
+                if let Some(turned) = turned.get_mut(*corner as usize) {
+                    *turned = true;
+                }
+            }
+        }
+    }
+    for (normal, turned) in mesh.normals.iter_mut().zip(turned) {
+        if turned {
+            *normal = -*normal;
+        }
+    }
+}
+
+/// The mesh that deforms as the shapes are one after another; of each some triangles were dropped, which had a corner that is
+/// no number.
 pub(super) fn joined(
     shapes: Vec<Shape>,
+    dropped: &[usize],
     times: Vec<f32>,
     properties: &Properties<'_>,
 ) -> Result<Shape> {
@@ -421,6 +448,23 @@ mod tests {
             let corners = mesh.corners(0, mesh.moment(step as f32 / 10.0));
             assert!(corners.iter().all(|c| bounds.with(*c) == bounds));
         }
+    }
+
+    #[test]
+    fn a_mesh_that_goes_through_a_plane_keeps_its_winding() {
+        let first = mesh::cube();
+        let mut mirrored = first.clone();
+        mirrored.transform(&glam::DMat4::from_scale(glam::DVec3::new(-1.0, 1.0, 1.0)));
+        mirrored.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+        keep_winding(&first.triangles, &mut mirrored);
+        assert_eq!(mirrored.triangles, first.triangles);
+        // By the cofactors of diag(s, 1, 1), which are diag(1, s, s).
+        for (before, after) in first.normals.iter().zip(&mirrored.normals) {
+            let expected = *before * Vec3::new(1.0, -1.0, -1.0);
+            assert!(after.distance(expected) < 1e-6, "{before} {after}");
+        }
+        let sets = [first, mirrored].map(TriangleMesh::new);
+        DeformingMesh::new(sets.into(), vec![0.0, 1.0]).unwrap();
     }
 
     #[test]

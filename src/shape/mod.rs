@@ -578,18 +578,19 @@ fn from_file(
     properties: &Properties<'_>,
     setting: &Setting<'_>,
 ) -> Result<Shape> {
-    let shape = mesh::place_file(loaded, properties, setting)?;
     let Some(Build::Read(options)) = single(properties) else {
-        return Ok(shape);
+        return mesh::place_file(loaded, properties, setting);
     };
     let sets = Sets::of(properties)?;
-    let (Sets::Files(times) | Sets::Animation(times)) = &sets else {
-        return Ok(shape);
+    let times = match &sets {
+        Sets::Files(times) | Sets::Animation(times) if sets.deform() => times,
+        _ => return mesh::place_file(loaded, properties, setting),
     };
-    if !sets.deform() {
-        return Ok(shape);
-    }
-    let mut shapes = vec![shape];
+    let first = match &sets {
+        Sets::Animation(_) => loaded.mesh.triangles.clone(),
+        _ => Vec::new(),
+    };
+    let mut shapes = vec![mesh::place_file(loaded, properties, setting)?];
     for (number, time) in times.iter().enumerate().skip(1) {
         let mut file = mesh::file(properties, options(properties)?)?;
         match &sets {
@@ -597,7 +598,10 @@ fn from_file(
             _ => file.path = properties.file(&deforming::file_name(number))?,
         }
         let loaded = read(&file.path, &file.options, properties.budget());
-        let loaded = loaded.map_err(|e| e.named_at(properties.location()))?;
+        let mut loaded = loaded.map_err(|e| e.named_at(properties.location()))?;
+        if let Sets::Animation(_) = sets {
+            deforming::keep_winding(&first, &mut loaded.mesh);
+        }
         shapes.push(mesh::place_file(Cow::Owned(loaded), properties, setting)?);
     }
     deforming::joined(shapes, times.clone(), properties)

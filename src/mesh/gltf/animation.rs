@@ -57,6 +57,8 @@ pub struct GltfAnimation {
     pub moments: Vec<f32>,
     /// How many more of them there would be, if that were not too many.
     pub passed_over: usize,
+    /// Nodes whose scale goes through 0 between two moments, in words: their meshes turn inside out.
+    pub turned_over: Vec<String>,
 }
 
 /// How far a node may turn between two moments, in radians: the middle of an arc is off by 1 − cos of half of it, 0.9 %.
@@ -107,8 +109,15 @@ pub(super) fn moments(
             .map(|i| moments[i * (all - 1) / (MOST - 1)])
             .collect();
     }
+    let turned_over = (channels.iter())
+        .filter(|moving| matches!(moving.path, Path::Scale) && moving.turns_over(&moments))
+        .map(|moving| match &accessors.root.nodes[moving.node].name {
+            Some(name) => format!("node {} ({name:?})", moving.node),
+            None => format!("node {}", moving.node),
+        });
     Ok(Some(GltfAnimation {
         span,
+        turned_over: turned_over.collect(),
         passed_over: all - moments.len(),
         moments,
     }))
@@ -130,6 +139,20 @@ enum Path {
 }
 
 impl Moving {
+    /// Whether a scale mirrors at some of the moments, and at others does not.
+    fn turns_over(&self, moments: &[f32]) -> bool {
+        let sides = moments.iter().map(|time| {
+            let scale = self.keys.at(*time).into_iter();
+            scale.map(f64::from).product::<f64>()
+        });
+        let (mut mirrors, mut stays) = (false, false);
+        for side in sides {
+            mirrors |= side < 0.0;
+            stays |= side > 0.0;
+        }
+        mirrors && stays
+    }
+
     fn at(&self, time: f32) -> Change {
         let value = self.keys.at(time);
         let three = || std::array::from_fn(|i| f64::from(value[i]));

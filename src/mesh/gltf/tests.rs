@@ -865,8 +865,10 @@ fn an_animation_stands_where_it_is_at_a_time() {
             span,
             moments,
             passed_over,
+            turned_over,
         } = animation.unwrap().unwrap();
         assert_eq!((span, passed_over), ([1.0, 3.0], 0));
+        assert!(turned_over.is_empty());
         assert!(moments.windows(2).all(|pair| pair[0] < pair[1]));
         moments
     };
@@ -887,6 +889,33 @@ fn an_animation_stands_where_it_is_at_a_time() {
     let after = [third(5.0), 2.75, 3.0_f32.next_down(), 3.0, 9.0];
     assert!(looked([2.5, 9.0]).ends_with(&after));
     assert_eq!(looked([2.0, 2.0]), [2.0]);
+}
+
+/// A rectangle whose node's scale goes from 1 to `last` in a second.
+fn scaled_to(last: [f32; 3]) -> Document {
+    let mut document = Document::rectangle();
+    document.node()["name"] = "sail".into();
+    let about = |kind: &str| json!({"componentType": 5126, "count": 2, "type": kind});
+    let times = document.accessor(&f32s(&[0.0, 1.0]), about("SCALAR"));
+    let scales = [[1.0; 3], last].concat();
+    let scales = document.accessor(&f32s(&scales), about("VEC3"));
+    document.json["animations"] = json!([{
+        "channels": [{"sampler": 0, "target": {"node": 0, "path": "scale"}}],
+        "samplers": [{"input": times, "output": scales}]}]);
+    document
+}
+
+#[test]
+fn nodes_that_turn_inside_out_while_the_shutter_is_open_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("test.gltf");
+    std::fs::write(&path, scaled_to([-1.0, 1.0, 1.0]).text()).unwrap();
+    for (shutter, named) in [([0.0, 1.0], true), ([0.0, 0.4], false), ([0.6, 1.0], false)] {
+        let animation = read_gltf_animation(&path, shutter, &Budget::default());
+        let turned_over = animation.unwrap().unwrap().turned_over;
+        let expected = named.then(|| r#"node 0 ("sail")"#.to_owned());
+        assert_eq!(turned_over, Vec::from_iter(expected), "{shutter:?}");
+    }
 }
 
 #[test]

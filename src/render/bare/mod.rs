@@ -135,6 +135,13 @@ pub fn describe_mesh(
         );
         tell(&mut loaded, path, message);
     }
+    for node in staging.animation.iter().flat_map(|a| &a.turned_over) {
+        let message = format!(
+            "while the shutter is open the scale of {node} goes through 0: its meshes turn inside out, and keep the sides \
+             that their triangles have when it opens"
+        );
+        tell(&mut loaded, path, message);
+    }
     let settings = match plugin {
         "gltf" => read_gltf_settings(path, staging.moments(), budget)?,
         _ => vec![GltfSetting::default()],
