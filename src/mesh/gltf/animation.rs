@@ -44,8 +44,21 @@ struct Keys {
 /// What the first animation says of the nodes at `time`, in seconds.
 pub(super) fn changes(accessors: &Accessors<'_>, time: f32) -> OrWhy<Vec<Change>> {
     let channels = channels(accessors)?.into_iter();
-    Ok(channels.map(|moving| moving.at(time)).collect())
+    let changes = channels.map(|moving| {
+        let value = moving.keys.at(time);
+        match value.iter().all(|number| number.abs() <= LARGEST) {
+            true => Ok(moving.change(value)),
+            false => Err(format!(
+                "animation 0, channel {}: its spline goes beyond ±{LARGEST:e} at {time} s",
+                moving.number
+            )),
+        }
+    });
+    changes.collect()
 }
+
+/// Values are no larger: their squares are numbers of single precision.
+const LARGEST: f32 = 1e18;
 
 /// When the first animation is looked at.
 #[derive(Clone, Debug, PartialEq)]
@@ -125,6 +138,8 @@ pub(super) fn moments(
 
 /// What of a node moves.
 struct Moving {
+    /// Of its channel.
+    number: usize,
     node: usize,
     path: Path,
     keys: Keys,
@@ -153,8 +168,7 @@ impl Moving {
         mirrors && stays
     }
 
-    fn at(&self, time: f32) -> Change {
-        let value = self.keys.at(time);
+    fn change(&self, value: Vec<f32>) -> Change {
         let three = || std::array::from_fn(|i| f64::from(value[i]));
         let to = match self.path {
             Path::Translation => To::Translation(three()),
@@ -175,7 +189,7 @@ fn channels(accessors: &Accessors<'_>) -> OrWhy<Vec<Moving>> {
     let mut channels = Vec::new();
     for (i, channel) in animation.channels.iter().enumerate() {
         let sampler = at(&animation.samplers, channel.sampler, "sampler")?;
-        let moving = moving(accessors, channel, sampler);
+        let moving = moving(accessors, i, channel, sampler);
         channels.extend(moving.map_err(|why| format!("animation 0, channel {i}: {why}"))?);
     }
     Ok(channels)
@@ -183,6 +197,7 @@ fn channels(accessors: &Accessors<'_>) -> OrWhy<Vec<Moving>> {
 
 fn moving(
     accessors: &Accessors<'_>,
+    number: usize,
     channel: &Channel,
     sampler: &Sampler,
 ) -> OrWhy<Option<Moving>> {
@@ -229,13 +244,25 @@ fn moving(
             "{found} numbers at {keys} keyframes are no animation"
         ));
     }
+    if let Some(place) = (values.iter()).position(|value| value.is_nan() || value.abs() > LARGEST) {
+        let keyframe = place / (values.len() / times.len());
+        return Err(format!(
+            "the {} of node {node} has the number {:e} at keyframe {keyframe}: it must be within ±{LARGEST:e}",
+            channel.target.path, values[place]
+        ));
+    }
     let keys = Keys {
         times,
         values,
         width,
         between,
     };
-    Ok(Some(Moving { node, path, keys }))
+    Ok(Some(Moving {
+        number,
+        node,
+        path,
+        keys,
+    }))
 }
 
 impl Keys {

@@ -919,6 +919,24 @@ fn nodes_that_turn_inside_out_while_the_shutter_is_open_are_named() {
 }
 
 #[test]
+fn an_animation_s_values_are_numbers_of_a_size_that_can_be_rendered() {
+    for wrong in [f32::NAN, f32::INFINITY, 1e30] {
+        let options = ReadOptions {
+            time: Some(crate::mesh::Time::of(0.5)),
+            ..ReadOptions::default()
+        };
+        let read = decode("test.gltf", &scaled_to([1.0, wrong, 1.0]).text(), &options);
+        let error = read.unwrap_err().to_string();
+        assert!(
+            error.contains("test.gltf")
+                && error.contains("animation 0, channel 0: the scale of node 0")
+                && error.contains("keyframe 1"),
+            "{error}"
+        );
+    }
+}
+
+#[test]
 fn an_animation_that_is_none_is_told() {
     let mut document = Document::rectangle();
     let about = json!({"componentType": 5126, "count": 2, "type": "SCALAR"});
