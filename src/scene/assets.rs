@@ -71,6 +71,7 @@ impl Assets {
             shapes,
             instances,
             mut problems,
+            mut warnings,
             ..
         } = plan;
         let sites = shapes.iter().map(|planned| Site {
@@ -86,7 +87,6 @@ impl Assets {
                 loaded();
             }
         });
-        let mut warnings = Vec::new();
         let mut members = Vec::with_capacity(shapes.len());
         let mut files = BTreeSet::new();
         for (Planned { properties, space }, result) in shapes.iter().zip(results) {
@@ -177,6 +177,7 @@ struct Plan<'a> {
     /// How many shapes were met in groups, each as often as it is referred to.
     met: usize,
     problems: Problems,
+    warnings: Vec<Problem>,
 }
 
 impl<'a> Plan<'a> {
@@ -284,6 +285,12 @@ impl<'a> Plan<'a> {
         if let Some(group) = self.groups.get(&properties.node_id()) {
             return *group;
         }
+        if let Ok(Some(_)) = properties.animation("to_world") {
+            let message = "a shapegroup has no place of its own: this <animation> moves nothing";
+            let warning = properties.error("to_world", message);
+            let warning = warning.help("animate the instances of it");
+            self.warnings.extend_from_slice(warning.problems());
+        }
         self.group_count += 1;
         let group = self.group_count;
         self.groups.insert(properties.node_id(), group);
@@ -377,6 +384,20 @@ mod tests {
         assert_eq!(of, [1, 1, 2]);
         assert_eq!(assets.instances[1].to_world.at(0.0).translation().x, 3.0);
         assert_eq!(assets.primitive_count(), 12 + 1 + 1 + 1);
+    }
+
+    #[test]
+    fn a_shapegroup_that_is_to_move_is_told_to_move_its_instances() {
+        let assets = load(
+            r#"<shape type="instance"><ref id="g"/></shape><shape type="instance"><ref id="g"/></shape>
+               <shape type="shapegroup" id="g"><shape type="disk"/><animation name="to_world">
+               <transform time="0"/><transform time="1"><translate x="1"/></transform></animation></shape>"#,
+        );
+        let warnings = assets.unwrap().warnings;
+        let [warning] = &warnings[..] else {
+            panic!("{warnings:?}")
+        };
+        assert!(warning.to_string().contains("moves nothing"), "{warning}");
     }
 
     #[test]
