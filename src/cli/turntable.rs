@@ -3,6 +3,7 @@
 //! camera that looks down a little goes around in a level circle.
 
 use etendue::description::{Description, NodeId, Value};
+use etendue::math::Moving;
 use etendue::shape::Bounds;
 use glam::{DMat4, DVec3, DVec4};
 
@@ -40,34 +41,50 @@ impl Orbit {
     pub(super) fn place(&self, description: &mut Description, sensor: NodeId) {
         let begin = self.turns.rem_euclid(1.0);
         let set = |description: &mut Description, value| description.set(sensor, "to_world", value);
-        let pose = match description.get(sensor, "to_world") {
-            Some(Value::Animation(keyframes)) => {
-                let rotation = rotation(&keyframes[0].1, self.center, begin);
-                let turned = keyframes
-                    .iter()
-                    .map(|(time, pose)| (*time, rotation * *pose));
-                let turned = Value::Animation(turned.collect());
-                return set(description, turned);
-            }
-            Some(Value::Transform(pose)) => *pose,
-            _ => DMat4::IDENTITY,
+        let own = match description.get(sensor, "to_world") {
+            Some(Value::Animation(keyframes)) => keyframes.clone(),
+            Some(Value::Transform(pose)) => vec![(0.0, *pose)],
+            _ => vec![(0.0, DMat4::IDENTITY)],
         };
-        let turned = |turns: f64| rotation(&pose, self.center, turns) * pose;
+        let first = own[0].1;
+        let turn = |turns: f64| rotation(&first, self.center, turns);
         let moves = self.shutter.filter(|(open, close)| open < close);
         let Some((open, close)) = moves else {
-            if begin != 0.0 {
-                set(description, Value::Transform(turned(begin)));
+            let turned = own.iter().map(|(time, pose)| (*time, turn(begin) * *pose));
+            match own.len() {
+                1 if begin == 0.0 => {}
+                1 => set(description, Value::Transform(turn(begin) * first)),
+                _ => set(description, Value::Animation(turned.collect())),
             }
             return;
         };
         let steps = (self.speed * (close - open) / STEP)
             .ceil()
             .clamp(1.0, MOST_STEPS);
-        let keyframe = |step: f64| {
-            let after = (close - open) * step / steps;
-            (open + after, turned(begin + self.speed * after))
+        let step = |step: u32| open + (close - open) * f64::from(step) / steps;
+        let mut times: Vec<f64> = (0..=steps as u32).map(step).collect();
+        let keys = own.iter().map(|(time, _)| *time);
+        times.extend(keys.filter(|time| open < *time && *time < close));
+        times.sort_by(f64::total_cmp);
+        times.dedup();
+        let moving = match own.len() {
+            1 => None,
+            _ => Moving::new(&own).ok(),
         };
-        let keyframes = (0..=steps as u32).map(|step| keyframe(step.into()));
+        let keyframe = |time: f64| {
+            let pose = match &moving {
+                Some(moving) => {
+                    let pose = moving.at(time as f32);
+                    DMat4::from_mat3_translation(
+                        pose.linear().as_dmat3(),
+                        pose.translation().as_dvec3(),
+                    )
+                }
+                None => first,
+            };
+            (time, turn(begin + self.speed * (time - open)) * pose)
+        };
+        let keyframes = times.into_iter().map(keyframe);
         set(description, Value::Animation(keyframes.collect()));
     }
 }
@@ -126,9 +143,36 @@ mod tests {
         assert_eq!((first.0, last.0), (7.0, 7.25));
         assert!(first.1.distance(DVec3::new(4.0, 0.0, 0.0)) < 1e-9);
         assert!(last.1.distance(DVec3::new(0.0, 0.0, -4.0)) < 1e-9);
-        let moving = etendue::math::Moving::new(keyframes).unwrap();
+        let moving = Moving::new(keyframes).unwrap();
         let radius = moving.at(7.1234).translation().length();
         assert!((radius - 4.0).abs() < 2e-4, "{radius}");
+    }
+
+    /// From z = 4 to z = 6 in a second, on a quarter of a turn: half way it is 5 from the middle, and has turned by 45°.
+    #[test]
+    fn a_camera_that_moves_goes_around_while_it_does() {
+        let text = "<scene version='3.0.0'><sensor type='perspective'><animation name='to_world'>
+            <transform time='0'><lookat origin='0, 0, 4' target='0, 0, 0' up='0, 1, 0'/></transform>
+            <transform time='1'><lookat origin='0, 0, 6' target='0, 0, 0' up='0, 1, 0'/></transform>
+            </animation></sensor></scene>";
+        let mut scene =
+            Description::parse(text, Path::new("test.xml"), &Options::default()).unwrap();
+        let sensor = scene.children_of(scene.root().node_id(), Kind::Sensor)[0];
+        let orbit = Orbit {
+            speed: 0.25,
+            ..orbit(DVec3::ZERO, 0.0, Some((0.0, 1.0)))
+        };
+        orbit.place(&mut scene, sensor);
+        let Some(Value::Animation(keyframes)) = scene.get(sensor, "to_world") else {
+            panic!("it moves")
+        };
+        let moving = Moving::new(keyframes).unwrap();
+        for (time, distance, degrees) in [(0.0, 4.0, 0.0_f32), (0.5, 5.0, 45.0), (1.0, 6.0, 90.0)] {
+            let (sin, cos) = degrees.to_radians().sin_cos();
+            let expected = distance * Vec3::new(sin, 0.0, cos);
+            let found = moving.at(time).translation();
+            assert!(found.distance(expected) < 1e-3, "{time}: {found}");
+        }
     }
 
     fn turned(to_world: &str, turns: f64) -> DMat4 {
