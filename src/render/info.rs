@@ -11,8 +11,9 @@ use super::prepare::{self, View};
 use super::progress::Progress;
 use super::session::{Session, Task};
 use crate::color::ColorModel;
-use crate::description::{Description, Kind, NodeId, Part};
+use crate::description::{Description, Kind, NodeId, Part, Properties};
 use crate::error::{Problem, Result};
+use crate::shape;
 
 /// What a scene holds.
 #[derive(Clone, Debug, Serialize)]
@@ -32,6 +33,8 @@ pub struct SceneInfo {
     pub plugins: BTreeMap<&'static str, BTreeMap<String, usize>>,
     /// The sensors, in file order.
     pub sensors: Vec<SensorInfo>,
+    /// What moves while time goes on, whether a shutter sees it or not.
+    pub motion: MotionInfo,
     /// Meshes and images that the scene names.
     pub files: Vec<NamedFile>,
     /// What the user should know.
@@ -51,6 +54,21 @@ pub struct SensorInfo {
     pub size: [u32; 2],
     /// Samples a pixel.
     pub spp: u32,
+    /// When its shutter opens and closes, in the units of keyframes.
+    pub shutter: [f32; 2],
+    /// Whether it moves, at whatever time.
+    pub moves: bool,
+}
+
+/// What of a scene's file moves, that included which nothing refers to.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct MotionInfo {
+    /// Shapes, groups and instances with keyframes of their own.
+    pub shapes: usize,
+    /// Meshes with several sets of vertices.
+    pub deforming_meshes: usize,
+    /// Lights with keyframes of their own; those on shapes move with these.
+    pub lights: usize,
 }
 
 /// A file that a scene names.
@@ -98,6 +116,7 @@ impl Session {
             geometry_bytes: contents.bytes[0],
             tree_bytes: contents.bytes[1],
             plugins: plugins(description),
+            motion: motion(description),
             // One that cannot be built is among the warnings.
             sensors: sensors.iter().filter_map(sensor).collect(),
             files: files.into_iter().map(file).collect(),
@@ -116,15 +135,42 @@ impl Task for Look<'_> {
     type Output = SensorInfo;
 
     fn run<C: ColorModel>(self, _color: C) -> Result<SensorInfo> {
-        let View { film, sampler, .. } = prepare::view::<C>(self.description, self.sensor)?;
+        let View {
+            sensor,
+            film,
+            sampler,
+            ..
+        } = prepare::view::<C>(self.description, self.sensor)?;
         let properties = self.description.node(self.sensor);
         Ok(SensorInfo {
             id: properties.id().map(str::to_owned),
             plugin: properties.plugin().to_owned(),
             size: [film.width, film.height],
             spp: sampler.sample_count(),
+            shutter: sensor.shutter().into(),
+            moves: moves(&properties),
         })
     }
+}
+
+/// Whether something has keyframes that differ, and a place that they are of.
+fn moves(properties: &Properties<'_>) -> bool {
+    let keyframes = properties.animation("to_world").ok().flatten();
+    keyframes.is_some_and(|keyframes| keyframes.iter().any(|(_, pose)| *pose != keyframes[0].1))
+}
+
+fn motion(description: &Description) -> MotionInfo {
+    let mut motion = MotionInfo::default();
+    for node in description.nodes_of(Kind::Shape) {
+        let Ok(node) = shape::declared(&node) else {
+            continue;
+        };
+        let is_placed = ![shape::GROUP, shape::MERGE].contains(&node.plugin());
+        motion.shapes += usize::from(is_placed && moves(&node));
+        motion.deforming_meshes += usize::from(shape::deforms(&node));
+    }
+    motion.lights = (description.nodes_of(Kind::Emitter)).filter(moves).count();
+    motion
 }
 
 /// How often each plugin stands in the file.

@@ -53,7 +53,7 @@ pub use bare::{
 };
 pub use foveated::FoveatedReport;
 pub use heat::Heat;
-pub use info::{NamedFile, SceneInfo, SensorInfo};
+pub use info::{MotionInfo, NamedFile, SceneInfo, SensorInfo};
 pub use machine::machine;
 pub use memory::check_mesh;
 pub use merge::{MergeReport, Merged, merge};

@@ -545,11 +545,41 @@ fn info_counts_what_scenes_meshes_and_images_hold() {
     for line in [
         "mesh.ply\n",
         "  triangles                  1\n",
-        "    front: plugin perspective, size 24, 16, spp 2\n",
+        "    front: moves no, plugin perspective, shutter 0, 0, size 24, 16, spp 2\n",
         "    R: greatest ",
     ] {
         assert!(lines.contains(line), "{line:?}: {lines}");
     }
+}
+
+#[test]
+fn info_counts_what_moves() {
+    let place = Place::new();
+    let keyframes = r#"<animation name="to_world"><transform time="0"/><transform time="1"><translate x="1"/></transform></animation>"#;
+    let mesh =
+        r#"<string name="filename" value="mesh.ply"/><string name="filename_1" value="mesh.ply"/>"#;
+    let text = format!(
+        r#"<scene version="3.0.0"><sensor type="perspective">{keyframes}<float name="shutter_open" value="0.25"/>
+        <float name="shutter_close" value="0.5"/></sensor><sensor type="perspective"/>
+        <shape type="group">{keyframes}<shape type="cube"/><shape type="cube">{keyframes}</shape></shape>
+        <shape type="ply">{mesh}</shape><emitter type="point">{keyframes}</emitter></scene>"#
+    );
+    fs::write(place.0.path().join("moves.xml"), text).unwrap();
+    let told = place.run("info moves.xml --json").ends_with(0).objects();
+    let motion = serde_json::json!({ "shapes": 2, "deforming_meshes": 1, "lights": 1 });
+    assert_eq!(told[0]["motion"], motion);
+    let sensors = told[0]["sensors"].as_array().unwrap();
+    assert_eq!(sensors[0]["shutter"], serde_json::json!([0.25, 0.5]));
+    assert_eq!(
+        (&sensors[0]["moves"], &sensors[1]["moves"]),
+        (&true.into(), &false.into())
+    );
+    let text = place.run("info moves.xml");
+    assert!(
+        text.ends_with(0)
+            .stdout()
+            .contains("deforming meshes         1\n")
+    );
 }
 
 #[test]
