@@ -104,11 +104,10 @@ impl DisplayArguments {
             ..self.transform()
         };
         let given = asked != DisplayTransform::default() || self.bits == Depth::Sixteen;
-        let is_linear = |output: &&Path| {
-            matches!(
-                Format::of_output(output),
-                Ok(Format::Exr | Format::Hdr | Format::Pfm)
-            )
+        let is_linear = |output: &&Path| match Format::of_output(output) {
+            Ok(Format::Exr | Format::Hdr | Format::Pfm) => true,
+            Ok(Format::Tiff) => self.bits == Depth::Float,
+            _ => false,
         };
         let mut outputs = outputs.into_iter().peekable();
         let first = outputs.peek()?.display().to_string();
@@ -117,7 +116,11 @@ impl DisplayArguments {
         }
         let message =
             format!("{first} keeps linear values, and display options change nothing in it");
-        Some(Error::input(message).help("write .png, .jpg or .tif, now or by \"etendue convert\""))
+        Some(
+            Error::input(message).help(
+                "write .png, .jpg, or .tif with --bits 8 or 16, now or by \"etendue convert\"",
+            ),
+        )
     }
 }
 
@@ -239,6 +242,8 @@ mod tests {
             assert!(!unused(options, &["a.part"]), "{options}");
         }
         assert!(!unused("", &["a.exr"]) && !unused("--bits 32", &["a.exr"]));
+        assert!(unused("--bits 32 --view agx", &["a.tif"]) && !unused("--view agx", &["a.tif"]));
+        assert!(!unused("--bits 32", &["a.tif"]));
     }
 
     #[test]
