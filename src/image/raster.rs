@@ -1,12 +1,13 @@
 //! Pictures of integers by the crate `image`: PNG, BMP, TGA and PPM with its kin. They become code values in
 //! [0, 1] (v / 255 or v / 65535, not decoded). What else a PNG says of its colours (gAMA, cHRM, cICP, a
-//! profile) changes nothing, as in Mitsuba; codes of other displays than sRGB's (cICP) are told.
+//! profile) changes nothing, as in Mitsuba; codes of other displays than sRGB's (cICP, or else gAMA and cHRM) are told.
 
 use std::io::Cursor;
 
 use ::image::{ColorType, ImageDecoder, ImageError, ImageFormat, ImageReader};
 
 use crate::budget::Account;
+use crate::color::Primaries;
 use crate::error::{Error, Problem, Result};
 use crate::image::{Encoding, Image, Picture};
 
@@ -48,8 +49,16 @@ pub(super) fn decode(bytes: &[u8], format: ImageFormat, account: &Account) -> Re
 fn foreign(bytes: &[u8], format: ImageFormat) -> Vec<Problem> {
     const BT709: u8 = 1;
     const SRGB: u8 = 13;
-    let Some([primaries, transfer]) = cicp(bytes).filter(|_| format == ImageFormat::Png) else {
+    if format != ImageFormat::Png {
         return Vec::new();
+    }
+    let chunk = |kind: &[u8; 4]| chunks(bytes).find_map(|(k, data)| (k == *kind).then_some(data));
+    let Some(&[primaries, transfer, ..]) = chunk(b"cICP") else {
+        // A profile, and the word that all is sRGB, go before these.
+        return match chunk(b"iCCP").or(chunk(b"sRGB")) {
+            Some(_) => Vec::new(),
+            None => unlike_srgb(chunk(b"gAMA"), chunk(b"cHRM")),
+        };
     };
     if (primaries, transfer) == (BT709, SRGB) {
         return Vec::new();
@@ -73,22 +82,60 @@ fn foreign(bytes: &[u8], format: ImageFormat) -> Vec<Problem> {
     told.problems().to_vec()
 }
 
-/// The primaries and the curve that a PNG's cICP names, ahead of its pixels.
-fn cicp(png: &[u8]) -> Option<[u8; 2]> {
+/// What to say of a PNG whose exponent or whose chromaticities are far from sRGB's. Programs write 1/2.2 for sRGB's curve.
+fn unlike_srgb(gamma: Option<&[u8]>, chromaticities: Option<&[u8]>) -> Vec<Problem> {
+    const UNIT: f64 = 100_000.0;
+    let numbers = |data: &[u8]| -> Vec<f64> {
+        let (numbers, _) = data.as_chunks::<4>();
+        let number = |b: &[u8; 4]| f64::from(u32::from_be_bytes(*b)) / UNIT;
+        numbers.iter().map(number).collect()
+    };
+    let mut says = Vec::new();
+    if let Some(&[gamma]) = gamma.map(numbers).as_deref()
+        && (gamma * 2.2 - 1.0).abs() > 0.01
+    {
+        says.push(format!(
+            "its codes are light to the power of {gamma} (gAMA)"
+        ));
+    }
+    let Primaries {
+        red,
+        green,
+        blue,
+        white,
+    } = Primaries::BT709;
+    let srgb = [white, red, green, blue].concat();
+    let found = chromaticities
+        .map(numbers)
+        .filter(|found| found.len() == srgb.len());
+    let differs = |found: &Vec<f64>| found.iter().zip(&srgb).any(|(a, b)| (a - b).abs() > 0.005);
+    if let Some(found) = found.filter(differs) {
+        let [r, g, b] = [2, 4, 6].map(|i| format!("({}, {})", found[i], found[i + 1]));
+        says.push(format!("its primaries are {r}, {g} and {b} (cHRM)"));
+    }
+    if says.is_empty() {
+        return Vec::new();
+    }
+    let message = format!(
+        "the file says that {}: it is read as sRGB",
+        says.join(" and ")
+    );
+    let told = Error::input(message).help("keep linear values in an EXR file");
+    told.problems().to_vec()
+}
+
+/// Names and data of a PNG's chunks ahead of its pixels.
+fn chunks(png: &[u8]) -> impl Iterator<Item = ([u8; 4], &[u8])> {
     const SIGNATURE: usize = 8;
-    let mut rest = png.get(SIGNATURE..)?;
-    loop {
+    const CHECKSUM: usize = 4;
+    let mut rest = png.get(SIGNATURE..).unwrap_or_default();
+    std::iter::from_fn(move || {
         let (length, after) = rest.split_first_chunk::<4>()?;
         let (kind, data) = after.split_first_chunk::<4>()?;
         let length = u32::from_be_bytes(*length) as usize;
-        match (kind, data.get(..length)?) {
-            (b"cICP", [primaries, transfer, ..]) => return Some([*primaries, *transfer]),
-            (b"IDAT", _) => return None,
-            _ => {}
-        }
-        const CHECKSUM: usize = 4;
         rest = data.get(length.checked_add(CHECKSUM)?..)?;
-    }
+        (kind != b"IDAT").then_some((*kind, &data[..length]))
+    })
 }
 
 /// All that a decoder of the crate `image` makes.

@@ -297,13 +297,28 @@ fn png_files_say_what_their_codes_mean() {
         assert_eq!(&bytes[33..][..expected.len()], expected, "{tag:?}");
         let read = decode(Path::new("a.png"), &bytes, &Budget::default().open()).unwrap();
         let told = read.warnings.iter().map(|problem| problem.message.as_str());
-        let foreign = matches!(tag, Tag::Cicp { .. });
-        let expected = "the file says that its primaries are BT.2020 and its curve is PQ (cICP): it is read as sRGB";
+        let expected = match tag {
+            Tag::Cicp { .. } => Some("its primaries are BT.2020 and its curve is PQ (cICP)"),
+            Tag::Gamma(_, primaries) if !primaries.same(&Primaries::BT709) => {
+                Some("its primaries are (0.68, 0.32), (0.265, 0.69) and (0.15, 0.06) (cHRM)")
+            }
+            // 1/2.2 is what programs write for sRGB's curve.
+            _ => None,
+        };
+        let expected =
+            expected.map(|says| format!("the file says that {says}: it is read as sRGB"));
         assert_eq!(
             told.collect::<Vec<_>>(),
-            vec![expected; usize::from(foreign)]
+            Vec::from_iter(expected.as_deref())
         );
     }
+    let bytes = in_file("a.png", |path| {
+        write_codes(path, &codes, Tag::Gamma(1.0, Primaries::BT709)).unwrap();
+        std::fs::read(path).unwrap()
+    });
+    let read = decode(Path::new("a.png"), &bytes, &Budget::default().open()).unwrap();
+    let told = &read.warnings[0].message;
+    assert!(told.contains("light to the power of 1 (gAMA)"), "{told}");
 }
 
 #[test]
