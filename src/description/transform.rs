@@ -84,6 +84,9 @@ impl Reading<'_, '_> {
                 Unmovable::Sheared(_) => child
                     .error("a keyframe cannot shear: what lies between two is not clear then")
                     .help("write a scale before the rotations"),
+                Unmovable::Huge(_) => child
+                    .error("the transform has numbers that are too large to render with")
+                    .help("they must be within ±3.4e38, the range of single precision"),
                 _ => child
                     .error("the transform is singular: it flattens space")
                     .help("no scale may be 0"),

@@ -108,6 +108,8 @@ pub enum Unmovable {
     Time(usize),
     /// The transform is not affine, not finite or singular.
     Flat(usize),
+    /// The transform has numbers that single precision has not.
+    Huge(usize),
     /// The transform shears, so that it is no product of scale, rotation and translation.
     Sheared(usize),
     /// It mirrors and the one before does not, or the other way round: between them space would be flat.
@@ -120,6 +122,7 @@ impl fmt::Display for Unmovable {
             Self::Nothing => "there is no keyframe",
             Self::Time(_) => "the times of keyframes must be finite and follow each other",
             Self::Flat(_) => "the transform of a keyframe must be affine and invertible",
+            Self::Huge(_) => "the transform of a keyframe must be of numbers within ±3.4e38",
             Self::Sheared(_) => "the transform of a keyframe cannot shear",
             Self::Mirrored(_) => "of two keyframes one mirrors and the other does not",
         })
@@ -139,9 +142,13 @@ impl Pose {
     /// Takes a matrix apart.
     ///
     /// # Errors
-    /// [`Unmovable::Flat`] or [`Unmovable::Sheared`], with number 0.
+    /// [`Unmovable::Flat`], [`Unmovable::Huge`] or [`Unmovable::Sheared`], with number 0.
     pub fn new(matrix: &DMat4) -> Result<Self, Unmovable> {
-        Transform::new(matrix).ok_or(Unmovable::Flat(0))?;
+        let is_huge = matrix.is_finite() && !matrix.as_mat4().is_finite();
+        Transform::new(matrix).ok_or(match is_huge {
+            true => Unmovable::Huge(0),
+            false => Unmovable::Flat(0),
+        })?;
         let m = DAffine3::from_mat4(*matrix);
         let linear = m.matrix3;
         let lengths = DVec3::new(
@@ -337,6 +344,7 @@ impl Track {
         for (number, (time, matrix)) in keyframes.iter().enumerate() {
             let pose = Pose::new(matrix).map_err(|why| match why {
                 Unmovable::Sheared(_) => Unmovable::Sheared(number),
+                Unmovable::Huge(_) => Unmovable::Huge(number),
                 _ => Unmovable::Flat(number),
             })?;
             let step = times.last().map_or(1.0, |last| time - last);
@@ -859,6 +867,8 @@ mod tests {
         assert_eq!(why(&[(f64::NAN, id)]), Unmovable::Time(0));
         assert_eq!(why(&[(-1e308, id), (1e308, id)]), Unmovable::Time(1));
         assert_eq!(why(&[(0.0, id), (1.0, flat)]), Unmovable::Flat(1));
+        let far = DMat4::from_translation(DVec3::splat(1e300));
+        assert_eq!(why(&[(0.0, id), (1.0, far)]), Unmovable::Huge(1));
         assert_eq!(why(&[(0.0, id), (1.0, shear)]), Unmovable::Sheared(1));
         assert_eq!(
             why(&[(0.0, id), (1.0, id), (2.0, mirror)]),

@@ -94,6 +94,12 @@ impl<'a> Displacement<'a> {
 
     fn apply(&self, geometry: Geometry, most: usize, warnings: &mut Vec<Problem>) -> Result<Mesh> {
         let Self { properties, .. } = self;
+        if let Geometry::Deforming(_) = geometry {
+            let message = "a mesh that deforms cannot be displaced";
+            return Err(properties
+                .error(HEIGHT, message)
+                .help("leave out its later sets of vertices; <animation> may move it"));
+        }
         let bounds = match &geometry {
             Geometry::Mesh(mesh) => mesh.mesh().bounds(),
             other => Some(other.bounds(0)).map(|Bounds { min, max }| (min, max)),

@@ -291,6 +291,14 @@ impl Sets {
             .filter(|p| p.name.starts_with(STEM))
             .count();
         let count = 1 + (1..).take_while(|i| properties.has(&file_name(*i))).count();
+        if properties.has(&file_name(0)) {
+            return Err(properties
+                .error(
+                    &file_name(0),
+                    "the first file is \"filename\", without a number",
+                )
+                .help("number the later ones from 1: \"filename_1\""));
+        }
         if numbered >= count {
             let missing = file_name(count);
             let message =
@@ -405,6 +413,14 @@ pub(super) fn joined(
             true => file_name(number),
             false => "times".to_owned(),
         };
+        let (first, now) = (dropped[0], dropped[number]);
+        if first != now && !matches!(why, Mismatch::Vertices(..)) {
+            let message = format!(
+                "{now} of its triangles have a corner whose place is not finite, and of the first mesh {first}"
+            );
+            let error = properties.error(&name, message);
+            return error.help("give each vertex a place at all times");
+        }
         let error = properties.error(&name, why.to_string());
         error.help("a mesh that deforms has the same triangles at all times")
     })?;

@@ -590,6 +590,7 @@ fn from_file(
         Sets::Animation(_) => loaded.mesh.triangles.clone(),
         _ => Vec::new(),
     };
+    let mut dropped = vec![loaded.dropped_triangles];
     let mut shapes = vec![mesh::place_file(loaded, properties, setting)?];
     for (number, time) in times.iter().enumerate().skip(1) {
         let mut file = mesh::file(properties, options(properties)?)?;
@@ -602,9 +603,10 @@ fn from_file(
         if let Sets::Animation(_) = sets {
             deforming::keep_winding(&first, &mut loaded.mesh);
         }
+        dropped.push(loaded.dropped_triangles);
         shapes.push(mesh::place_file(Cow::Owned(loaded), properties, setting)?);
     }
-    deforming::joined(shapes, times.clone(), properties)
+    deforming::joined(shapes, &dropped, times.clone(), properties)
 }
 
 /// Whether the shape deforms, so that it has to stand in a group of its own.

@@ -485,6 +485,11 @@ fn what_makes_no_motion_is_told_where_it_stands() {
         "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
     )
     .unwrap();
+    fs::write(
+        folder.path().join("nowhere-near.obj"),
+        "v -1 -1 0\nv 1 -1 nan\nv 1 1 0\nv -1 1 0\nv 0 0 1\nf 1 2 5\nf 2 3 5\nf 3 4 5\nf 4 1 5\n",
+    )
+    .unwrap();
     let sheet = |more: &str| {
         format!("<shape type='obj'>\n<string name='filename' value='sheet-0.obj'/>\n{more}</shape>")
     };
@@ -503,6 +508,9 @@ fn what_makes_no_motion_is_told_where_it_stands() {
         (frames(first, "<transform time='1'><scale x='-1'/></transform>"), 4, "one mirrors and the other does not"),
         (frames(first, "<transform time='1'><scale x='0'/></transform>"), 4, "singular"),
         (sheet(&name(1, "other.obj")), 3, "it has 3 vertices, and the first mesh 5"),
+        (sheet(&name(1, "nowhere-near.obj")), 3, "2 of its triangles have a corner whose place is not finite"),
+        (frames(first, "<transform time='1'><translate x='1e300'/></transform>"), 4, "too large"),
+        (sheet(&name(0, "sheet-1.obj")), 3, "the first file is \"filename\""),
         (sheet(&name(2, "sheet-1.obj")), 2, "there is no \"filename_1\""),
         (sheet("<string name='times' value='0, 1'/>"), 3, "there is one"),
         (sheet(&(name(1, "sheet-1.obj") + "<string name='times' value='0'/>")), 4, "1 times for 2 files"),
@@ -510,7 +518,13 @@ fn what_makes_no_motion_is_told_where_it_stands() {
         (sheet(&(name(1, "sheet-1.obj") + "<string name='times' value='a, b'/>")), 4, "are no numbers"),
         (sheet(&(name(1, "nowhere.obj"))), 3, "nowhere.obj"),
         (sheet(&(name(1, "sheet-1.obj") + "<emitter type='area'/>")), 4, "cannot be a light"),
-        (sheet(&(name(1, "sheet-1.obj") + "<float name='displacement' value='1'/>")), 4, "cannot be displaced"),
+        (sheet(&(name(1, "sheet-1.obj") + "<float name='displacement' value='1'/>")), 4, "a mesh that deforms cannot be displaced"),
+        (
+            "<shape type='merge'>\n<animation name='to_world'><transform time='0'/></animation><shape type='sphere'/></shape>"
+                .to_owned(),
+            2,
+            "a merge has no place of its own",
+        ),
         (
             format!("<shape type='shapegroup'>\n{}</shape>", frames(first, "<transform time='1'><scale x='2'/></transform>")),
             3,

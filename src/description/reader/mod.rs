@@ -22,6 +22,11 @@ pub(super) const MAX_DEPTH: usize = 64;
 /// The shape that Mitsuba's writer puts around what it merges, be that no shape at all: what is in it stands as if the
 /// tag were not there.
 const MERGE: &str = "merge";
+
+/// Whether the tag is of a place, or of several over time.
+fn is_motion(tag: &str) -> bool {
+    matches!(tag, "transform" | "animation")
+}
 /// Warnings that are kept.
 const MOST_WARNINGS: usize = 100;
 /// Elements in all files together.
@@ -240,7 +245,7 @@ impl<'o> Reader<'o> {
                 self.plugin(&element, file, place, &["type", "id", "name"])
             }
             tag if values::TAGS.contains(&tag) => self.value(&element, file, parent),
-            "transform" | "animation" => self.motion(&element, file, parent),
+            tag if is_motion(tag) => self.motion(&element, file, parent),
             "ref" => self.reference(&element, file, parent),
             "include" => self.include(&element, file, place),
             "default" => self.default(&element, file),
@@ -288,6 +293,14 @@ impl<'o> Reader<'o> {
         let name = element.optional("name").or(place.name).unwrap_or_default();
         let mut plugin = element.filled("type")?;
         if (kind, plugin) == (Kind::Shape, MERGE) {
+            let mut children = element.children();
+            if let Some(child) = children.find(|child| is_motion(child.tag_name().name())) {
+                let child = Element::open(child, &file.lines, &mut self.defines)?;
+                let message =
+                    "a merge has no place of its own: what is in it stands as if it were not there";
+                let help = "let each shape have a to_world, or write type=\"group\", Étendue's own, which has one";
+                return Err(child.error(message).help(help));
+            }
             self.children(element, file, place.parent, place.depth + 1);
             return Ok(());
         }
