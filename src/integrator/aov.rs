@@ -53,6 +53,11 @@ const QUANTITIES: &[(&str, Quantity, &[&str])] = &[
     ("uv", Quantity::Uv, &["U", "V"]),
 ];
 
+/// What scene files write, in words.
+const KINDS: &str = "name:kind pairs, parted by commas; a kind is albedo, depth (distance), dp_du, dp_dv, duv_dx, duv_dy, \
+    geo_normal, position, prim_index, sh_normal, shape_index, uv, or Étendue's own motion (pixels by which what is seen is \
+    displaced while the shutter is open)";
+
 /// A nested integrator.
 #[derive(Debug)]
 struct Nested<C: ColorModel> {
@@ -75,7 +80,7 @@ impl<C: ColorModel> Aov<C> {
         properties: &[
             limits::UNUSED,
             &[
-                string("aovs", "", "name:kind pairs, parted by commas"),
+                string("aovs", "", KINDS),
                 nested(Kind::Integrator, "whose image is written too"),
             ],
         ],
@@ -287,5 +292,18 @@ impl<C: ColorModel> Aov<C> {
         let footprint = self.footprint.as_ref();
         let duv = footprint.map_or(Vec2::ZERO, |f| f.duv(&start.ray, at)[axis]);
         [duv.x, duv.y, 0.0]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_table_of_properties_names_every_kind() {
+        let named: Vec<&str> = KINDS.split([' ', ',', ';']).collect();
+        for (kind, ..) in QUANTITIES {
+            assert!(named.contains(kind), "{kind}");
+        }
     }
 }
