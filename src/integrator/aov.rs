@@ -2,7 +2,7 @@
 //! `name:kind, …`; nested integrators give the image itself (the first) and, where they have a name,
 //! channels `name.R` and so on; without any it is black and clear. Where the camera sees nothing a channel is 0: shapes
 //! are counted from 1. Emitters that are hidden from light are seen here. `motion`, Étendue's own, is by how many pixels,
-//! to the right and down, what is seen is displaced from when the shutter opens to when it closes.
+//! to the right and down, what is seen is displaced from when the shutter opens to when it closes; the sky as the camera turns.
 
 use std::collections::HashSet;
 
@@ -109,6 +109,13 @@ impl<C: ColorModel> Aov<C> {
             if properties.is_strict() && matches!(quantity, Quantity::Motion) {
                 let error = properties.error("aovs", "the kind \"motion\" is Étendue's own");
                 return Err(error.help(STRICT));
+            }
+            if context.unprojected && matches!(quantity, Quantity::Motion) {
+                let message =
+                    "the kind \"motion\" is of sensors that project, and this one does not";
+                return Err(properties.error("aovs", message).help(
+                    "perspective, thinlens and orthographic do; of a batch render each sensor by itself",
+                ));
             }
             quantities.push((name.trim().to_owned(), *quantity, *suffixes));
         }
@@ -237,9 +244,11 @@ impl<C: ColorModel> Estimator<C> for Aov<C> {
                 }
             });
             for (_, quantity, suffixes) in &self.quantities {
-                let values = at
-                    .as_ref()
-                    .map_or([0.0; 3], |at| self.show(*quantity, scene, (start, hit), at));
+                let values = match (&at, quantity) {
+                    (Some(at), _) => self.show(*quantity, scene, (start, hit), at),
+                    (None, Quantity::Motion) => self.sky_motion(start),
+                    (None, _) => [0.0; 3],
+                };
                 estimates.extra.extend_from_slice(&values[..suffixes.len()]);
             }
         }
@@ -283,6 +292,14 @@ impl<C: ColorModel> Aov<C> {
     fn motion(&self, scene: &Scene<C>, hit: &Hit, at: &Interaction<'_>) -> [f32; 3] {
         let motion = self.footprint.as_ref().map_or(Vec2::ZERO, |footprint| {
             footprint.motion(|time| scene.tracer().position_at(hit, at, time))
+        });
+        [motion.x, motion.y, 0.0]
+    }
+
+    /// How far what lies infinitely far is displaced over the film, in pixels.
+    fn sky_motion(&self, start: &Start<C>) -> [f32; 3] {
+        let motion = self.footprint.as_ref().map_or(Vec2::ZERO, |footprint| {
+            footprint.sky_motion(start.ray.direction)
         });
         [motion.x, motion.y, 0.0]
     }

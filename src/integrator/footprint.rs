@@ -2,7 +2,7 @@
 //! neighbouring points meet the plane that touches the surface, and the steps between these points are written, by
 //! least squares, as steps of u and v. As in Mitsuba a neighbour is a pixel away over the root of the samples in it.
 
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3, Vec4};
 
 use crate::interaction::{Cone, Interaction, Ray};
 use crate::sensor::{Film, Sensor};
@@ -58,8 +58,18 @@ impl Footprint {
     /// By how many pixels, to the right and down, what is at `position` at a time is displaced over the film while the
     /// shutter is open; 0 where it is behind the camera.
     pub(super) fn motion(&self, position: impl Fn(f32) -> Vec3) -> Vec2 {
+        self.motion_of(|time| position(time).extend(1.0))
+    }
+
+    /// The same of what is infinitely far in a direction: only a camera that turns displaces it. 0 under parallel rays.
+    pub(super) fn sky_motion(&self, direction: Vec3) -> Vec2 {
+        self.motion_of(|_| direction.extend(0.0))
+    }
+
+    /// The same of a point in homogeneous coordinates.
+    fn motion_of(&self, point: impl Fn(f32) -> Vec4) -> Vec2 {
         let (open, close) = self.sensor.shutter();
-        let [from, to] = [open, close].map(|time| self.place(position(time), time));
+        let [from, to] = [open, close].map(|time| self.place(point(time), time));
         let motion = to - from;
         if motion.is_finite() {
             motion
@@ -68,10 +78,11 @@ impl Footprint {
         }
     }
 
-    /// Where a point is seen on the film, in pixels from its left and its top; not a number behind the camera.
-    fn place(&self, position: Vec3, time: f32) -> Vec2 {
+    /// Where a point in homogeneous coordinates is seen on the film, in pixels from its left and its top; not a number
+    /// behind the camera.
+    fn place(&self, point: Vec4, time: f32) -> Vec2 {
         let to_clip = self.sensor.projection() * self.sensor.world_to_camera(time);
-        let clip = to_clip * position.extend(1.0);
+        let clip = to_clip * point;
         let device = match clip.w > 0.0 {
             true => clip.truncate().truncate() / clip.w,
             false => Vec2::NAN,

@@ -141,6 +141,8 @@ pub struct Context {
     pub lights: Vec<String>,
     /// Of the camera, for channels that show how its rays spread; without, these are 0.
     pub footprint: Option<Footprint>,
+    /// Whether there is a sensor that projects nothing, over whose film nothing is displaced.
+    pub unprojected: bool,
     /// The node of the medium that the camera stands in.
     pub medium: Option<NodeId>,
     /// The sensor, where light finds it.

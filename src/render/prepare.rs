@@ -181,6 +181,9 @@ pub(super) fn view<C: ColorModel>(description: &Description, sensor: NodeId) -> 
             .as_ref()
             .zip(film.as_ref())
             .and_then(|(sensor, film)| Lens::new(sensor, film)),
+        unprojected: sensor
+            .as_ref()
+            .is_some_and(|sensor| !sensor.is_projective()),
         footprint: sensor
             .as_ref()
             .filter(|sensor| sensor.is_projective())

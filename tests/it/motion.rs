@@ -263,6 +263,13 @@ fn the_motion_of_a_pixel_is_how_far_what_it_shows_is_displaced() {
         r#"<lookat origin="0, 0, 4" target="0, 0, 0" up="0, 1, 0"/><translate x="0.8" y="0.4"/>"#;
     let moving = eye(animation(&[(0.0, look), (1.0, carried)]));
     close(motion(format!("{moving}{}", wall(""))), [-4.0, 2.0]);
+    // The sky stays where a camera is carried, and goes to the right by 20·tan 0.1 pixels where it turns to the left by 0.1.
+    close(motion(moving), [0.0, 0.0]);
+    let turn = |angle: f64| format!(r#"<rotate y="1" angle="{}"/>{look}"#, angle.to_degrees());
+    let turns = eye(animation(&[(0.0, &turn(0.0)), (1.0, &turn(0.1))]));
+    let [x, y] = motion(turns);
+    let expected = 20.0 * 0.1_f64.tan();
+    assert!((x - expected).abs() < 0.01 && y.abs() < 0.01, "{x} {y}");
 }
 
 // ---- the same bits
@@ -534,6 +541,12 @@ fn what_makes_no_motion_is_told_where_it_stands() {
             "<sensor type='perspective'>\n<float name='shutter_open' value='1'/><float name='shutter_close' value='0'/></sensor>".to_owned(),
             2,
             "lies before shutter_open",
+        ),
+        (
+            "<integrator type='aov'>\n<string name='aovs' value='m:motion'/></integrator>\
+             <sensor type='batch'><sensor type='perspective'/></sensor>".to_owned(),
+            2,
+            "is of sensors that project",
         ),
         ("<bsdf type='diffuse'><texture type='checkerboard' name='reflectance'>\n<animation name='to_uv'><transform time='0'/></animation></texture></bsdf>".to_owned(), 2, "expected a transform"),
     ];
