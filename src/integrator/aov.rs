@@ -187,6 +187,18 @@ impl<C: ColorModel> Estimator<C> for Aov<C> {
         (self.nested.iter()).any(|nested| nested.integrator.traces_light())
     }
 
+    fn photon_bytes(&self) -> u64 {
+        let bytes = self.nested.iter();
+        let bytes = bytes.map(|nested| nested.integrator.photon_bytes());
+        bytes.fold(0, u64::saturating_add)
+    }
+
+    fn prepare(&self, scene: &Scene<C>) {
+        for nested in &self.nested {
+            nested.integrator.prepare(scene);
+        }
+    }
+
     fn estimate(
         &self,
         scene: &Scene<C>,

@@ -10,6 +10,7 @@ mod aov;
 mod bdpt;
 mod depth;
 mod direct;
+mod guided;
 mod moment;
 mod path;
 mod phong;
@@ -21,12 +22,15 @@ mod volpathmis;
 mod arrival;
 mod bounce;
 mod cones;
+mod directions;
 mod footprint;
+mod guide;
 mod layers;
 mod lens;
 mod light_paths;
 mod limits;
 mod mis;
+mod photons;
 mod runs;
 mod volumetric;
 mod wave;
@@ -122,6 +126,14 @@ pub trait Estimator<C: ColorModel>: std::fmt::Debug + Send + Sync {
         false
     }
 
+    /// The most bytes of what [`Estimator::prepare`] makes.
+    fn photon_bytes(&self) -> u64 {
+        0
+    }
+
+    /// What is to be done once before the scene is rendered, on all threads.
+    fn prepare(&self, _scene: &Scene<C>) {}
+
     /// Estimates each start, in the order of the starts, in place of what `estimates` held.
     fn estimate(
         &self,
@@ -147,6 +159,8 @@ pub struct Context {
     pub medium: Option<NodeId>,
     /// The sensor, where light finds it.
     pub lens: Option<Lens>,
+    /// When the shutter opens and closes.
+    pub shutter: (f32, f32),
 }
 
 family! {
@@ -157,6 +171,7 @@ family! {
         "bdpt" => Bdpt(bdpt::Bdpt),
         "depth" => Depth(depth::Depth),
         "direct" => Direct(direct::Direct),
+        "guided" => Guided(guided::Guided),
         "moment" => Moment(moment::Moment<C>),
         "path" => Path(path::Path),
         "phong" => Phong(phong::Phong),
@@ -192,6 +207,14 @@ impl<C: ColorModel> Estimator<C> for Integrator<C> {
 
     fn traces_light(&self) -> bool {
         (**self).traces_light()
+    }
+
+    fn photon_bytes(&self) -> u64 {
+        (**self).photon_bytes()
+    }
+
+    fn prepare(&self, scene: &Scene<C>) {
+        (**self).prepare(scene);
     }
 
     fn estimate(

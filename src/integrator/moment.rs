@@ -58,6 +58,14 @@ impl<C: ColorModel> Estimator<C> for Moment<C> {
         self.nested.traces_light()
     }
 
+    fn photon_bytes(&self) -> u64 {
+        self.nested.photon_bytes()
+    }
+
+    fn prepare(&self, scene: &Scene<C>) {
+        self.nested.prepare(scene);
+    }
+
     fn estimate(
         &self,
         scene: &Scene<C>,

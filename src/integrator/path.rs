@@ -3,16 +3,18 @@
 //!
 //! `max_depth`, `rr_depth` and `hide_emitters`: see [`super::limits`].
 
-use super::bounce::Bounces;
+use super::bounce::{Bounces, Decisions};
+use super::guide::{Cells, Guide};
 use super::limits::{self, Limits};
 use super::mis::power;
 use super::wave::{Block, Contribution, Outcome, Shading, Wave, Ways};
 use super::{Context, Cost, Estimate, Estimates, Estimator, Footprint, Start};
-use crate::color::ColorModel;
+use crate::color::{ColorModel, Spectra as _};
 use crate::description::Properties;
 use crate::description::declared::Plugin;
 use crate::error::Result;
-use crate::lanes::{Lanes, Mask as _};
+use crate::lanes::{Lanes, Mask as _, Vec3};
+use crate::material::BsdfSamples;
 use crate::sampler::Sampler;
 use crate::scene::Scene;
 
@@ -63,6 +65,25 @@ impl<C: ColorModel> Estimator<C> for Path {
         estimates: &mut Estimates<C::Sample>,
         cost: &mut Cost,
     ) {
+        self.follow(scene, sampler, starts, None, (estimates, cost));
+    }
+}
+
+impl Path {
+    /// The most edges of a path.
+    pub(super) fn max_depth(&self) -> u32 {
+        self.limits.max_depth
+    }
+
+    /// [`Estimator::estimate`], with paths that a guide leads, if there is one.
+    pub(super) fn follow<C: ColorModel>(
+        &self,
+        scene: &Scene<C>,
+        sampler: &Sampler,
+        starts: &[Start<C>],
+        guide: Option<&Guide>,
+        (estimates, cost): (&mut Estimates<C::Sample>, &mut Cost),
+    ) {
         let estimates = &mut estimates.values;
         estimates.clear();
         estimates.resize(starts.len(), self.limits.start(scene, self.hide_emitters));
@@ -85,6 +106,7 @@ impl<C: ColorModel> Estimator<C> for Path {
             }
             let mut bounce = Bounce {
                 limits: &self.limits,
+                guide,
                 depth,
                 estimates,
             };
@@ -99,6 +121,7 @@ impl<C: ColorModel> Estimator<C> for Path {
 /// A bounce: a light sample and a way on.
 struct Bounce<'a, C: ColorModel> {
     limits: &'a Limits,
+    guide: Option<&'a Guide>,
     depth: u32,
     estimates: &'a mut [Estimate<C::Sample>],
 }
@@ -108,10 +131,15 @@ impl<C: ColorModel> Shading<C> for Bounce<'_, C> {
 
     #[inline(always)]
     fn shade<F: Lanes>(&mut self, block: &Block<'_, C, F>, out: &mut Outcome<'_, C, Self::Shadow>) {
+        let mut cells = None;
         if block.material.is_smooth() {
-            self.light(block, out);
+            if let Some(guide) = self.guide {
+                let found = guide.cells(&block.at);
+                cells = found.known.any().then_some(found);
+            }
+            self.light(block, cells.as_ref(), out);
         }
-        self.way(block, out);
+        self.way(block, cells.as_ref(), out);
     }
 }
 
@@ -121,6 +149,7 @@ impl<C: ColorModel> Bounce<'_, C> {
     fn light<F: Lanes>(
         &self,
         block: &Block<'_, C, F>,
+        cells: Option<&Cells<'_, F>>,
         out: &mut Outcome<'_, C, Contribution<C::Sample>>,
     ) {
         let numbers = block.decisions(LIGHT);
@@ -129,7 +158,11 @@ impl<C: ColorModel> Bounce<'_, C> {
         let light = block.scene.sample_lights(at, u1, u2, w);
         let wo = at.frame.to_local(light.direction);
         let value = block.material.eval_lanes(at, at.wi, wo, w);
-        let weight = F::select(light.delta, F::one(), power(light.pdf, value.pdf));
+        let pdf = match cells {
+            Some(cells) => cells.mixed(light.direction, value.pdf),
+            None => value.pdf,
+        };
+        let weight = F::select(light.delta, F::one(), power(light.pdf, pdf));
         let contribution = block.throughput * value.value * light.radiance * (weight / light.pdf);
         out.light(block, &light, contribution);
     }
@@ -139,12 +172,18 @@ impl<C: ColorModel> Bounce<'_, C> {
     fn way<F: Lanes>(
         &mut self,
         block: &Block<'_, C, F>,
+        cells: Option<&Cells<'_, F>>,
         out: &mut Outcome<'_, C, Contribution<C::Sample>>,
     ) {
         let numbers = block.decisions(WAY);
-        let (u2, u1) = (numbers.u2(), numbers.u1());
-        let (at, w) = (&block.at, block.wavelengths);
-        let sample = block.material.sample_lanes(at, at.wi, u1, u2, w);
+        let at = &block.at;
+        let sample = match cells {
+            Some(cells) => draw_guided(block, cells, &numbers),
+            None => {
+                let (u2, u1) = (numbers.u2(), numbers.u1());
+                (block.material).sample_lanes(at, at.wi, u1, u2, block.wavelengths)
+            }
+        };
         for lane in (at.active & !(sample.drawn & sample.null)).lanes() {
             self.estimates[block.walker(lane).slot as usize].alpha = 1.0;
         }
@@ -165,5 +204,43 @@ impl<C: ColorModel> Bounce<'_, C> {
             light_share: 1.0,
         };
         out.send(block, &ways);
+    }
+}
+
+/// Draws directions by the guide or by the material, and where there is no cell by the material alone.
+#[inline(always)]
+fn draw_guided<C: ColorModel, F: Lanes>(
+    block: &Block<'_, C, F>,
+    cells: &Cells<'_, F>,
+    numbers: &Decisions<'_, F>,
+) -> BsdfSamples<F, C::Columns<F>> {
+    let (u2, u1) = (numbers.u2(), numbers.u1());
+    let (at, w, material) = (&block.at, block.wavelengths, block.material);
+    let share = cells.share();
+    let guided = u1.lt(share);
+    let rest = F::one() - share;
+    let below_one = F::splat(1f32.next_down());
+    let lobe = ((u1 - share) / rest).max(F::zero()).min(below_one);
+    let sample = material.sample_lanes(at, at.wi, lobe, u2, w);
+    let toward = cells.sample(guided, u2, at.frame.to_world(sample.wo));
+    let wo = Vec3::select(guided, at.frame.to_local(toward), sample.wo);
+    let value = material.eval_lanes(at, at.wi, wo, w);
+    let pdf = cells.mixed(toward, value.pdf);
+    let delta = sample.delta & !guided;
+    let mixed = cells.known & !delta;
+    let weight = C::Columns::<F>::select(
+        mixed,
+        value.value * (F::one() / pdf),
+        sample.weight * (F::one() / rest),
+    );
+    let possible = F::zero().lt(pdf) & pdf.is_finite();
+    BsdfSamples {
+        drawn: (guided | sample.drawn) & (possible | !mixed),
+        wo,
+        weight,
+        pdf: F::select(mixed, pdf, sample.pdf * rest),
+        eta: F::select(guided, F::one(), sample.eta),
+        delta,
+        null: sample.null & !guided,
     }
 }

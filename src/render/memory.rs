@@ -27,9 +27,9 @@ const TRIANGLE: u64 = 12;
 pub fn check_mesh(path: &Path, limit: Option<u64>) -> Result<()> {
     let (assets, primitives) = of_file(path).unwrap_or_default();
     let estimate = Estimate {
-        film: 0,
         assets,
         trees: trees(primitives),
+        ..Estimate::default()
     };
     estimate.check(limit)
 }
@@ -42,6 +42,8 @@ pub(super) struct Estimate {
     /// Geometry and the images of textures.
     pub(super) assets: u64,
     pub(super) trees: u64,
+    /// What an integrator learns from photons.
+    pub(super) photons: u64,
 }
 
 /// The film's share for `channels` values a pixel.
@@ -89,6 +91,7 @@ impl Estimate {
         self.film
             .saturating_add(self.assets)
             .saturating_add(self.trees)
+            .saturating_add(self.photons)
     }
 
     /// Refuses what exceeds the limit.
@@ -103,15 +106,22 @@ impl Estimate {
             film,
             assets,
             trees,
+            photons,
         } = *self;
-        let largest = film.max(assets).max(trees);
+        let largest = film.max(assets).max(trees).max(photons);
         let help = if largest == film {
             "render it in crops (--crop) or smaller (--size)"
+        } else if largest == photons {
+            "take fewer photons"
         } else {
             "simplify the meshes, or place copies as instances of a shapegroup"
         };
+        let photons = match photons {
+            0 => String::new(),
+            _ => format!(", photons {}", human_bytes(photons)),
+        };
         Err(Error::input(format!(
-            "this render would take about {} (film {}, meshes and images {}, trees {}), more than the limit of {}",
+            "this render would take about {} (film {}, meshes and images {}, trees {}{photons}), more than the limit of {}",
             human_bytes(total),
             human_bytes(film),
             human_bytes(assets),
@@ -195,6 +205,7 @@ mod tests {
             film: 3_000_000_000,
             assets: 200_000,
             trees: 1_500,
+            photons: 0,
         };
         assert!(estimate.check(None).is_ok());
         assert!(estimate.check(Some(3_000_201_500)).is_ok());
@@ -204,6 +215,13 @@ mod tests {
             "{error}"
         );
         assert!(error.contains("--crop"), "{error}");
+        let photons = Estimate {
+            photons: 4_000_000_000,
+            ..estimate
+        };
+        let error = photons.check(Some(7_000_000_000)).unwrap_err().to_string();
+        assert!(error.contains("trees 1.5 kB, photons 4.0 GB)"), "{error}");
+        assert!(error.contains("take fewer photons"), "{error}");
     }
 
     #[test]

@@ -181,6 +181,9 @@ pub(super) fn view<C: ColorModel>(description: &Description, sensor: NodeId) -> 
             .as_ref()
             .zip(film.as_ref())
             .and_then(|(sensor, film)| Lens::new(sensor, film)),
+        shutter: (sensor.as_ref())
+            .map(|sensor| sensor.shutter())
+            .unwrap_or_default(),
         unprojected: sensor
             .as_ref()
             .is_some_and(|sensor| !sensor.is_projective()),
@@ -282,6 +285,8 @@ fn load(
 struct Share {
     /// Bytes of the film.
     film: u64,
+    /// Bytes of what is learnt from photons.
+    photons: u64,
     /// How many rays are to be expected.
     rays: u64,
     /// Their first and their last time.
@@ -362,6 +367,7 @@ fn make<C: ColorModel>(
     view: Option<&View<C>>,
     Share {
         film,
+        photons,
         rays,
         shutter,
     }: Share,
@@ -375,14 +381,16 @@ fn make<C: ColorModel>(
     let mut seconds = Seconds::default();
     let announced = Estimate {
         film,
+        photons,
         ..Estimate::of_files(description)
     };
     let budget = description.budget();
     announced.check(budget.limit())?;
     let of_given = given.as_ref().map_or(0, |given| given.loaded.mesh.room());
-    budget.begin(film.saturating_add(of_given));
+    budget.begin(film.saturating_add(photons).saturating_add(of_given));
     let assets = timed(&mut seconds.load, || {
-        let limit = budget.limit().map(|limit| limit.saturating_sub(film));
+        let others = film.saturating_add(photons);
+        let limit = (budget.limit()).map(|limit| limit.saturating_sub(others));
         load(
             description,
             given,
@@ -401,6 +409,7 @@ fn make<C: ColorModel>(
     let primitives = assets.primitive_count();
     let loaded = Estimate {
         film,
+        photons,
         assets: assets.bytes() as u64,
         trees: match options.method {
             Method::Brute | Method::Exhaustive | Method::Never => 0,
@@ -474,11 +483,12 @@ pub(super) fn prepare<'k, C: ColorModel>(ask: &'k mut Ask<'_>, color: C) -> Resu
             layout(&color, &view.integrator).stride(),
             options.by_blocks(),
         ),
+        photons: view.integrator.photon_bytes(),
         rays: rays(&view.film, view.sampler.sample_count()),
         shutter: view.sensor.shutter(),
     });
     let share = share.unwrap_or_default();
-    let film = share.film;
+    let Share { film, photons, .. } = share;
     let key = Key {
         scene: fingerprint::scene_key(description),
         model: Model::of(description, options)?,
@@ -519,6 +529,7 @@ pub(super) fn prepare<'k, C: ColorModel>(ask: &'k mut Ask<'_>, color: C) -> Resu
         film,
         assets,
         trees,
+        photons,
     }
     .check(description.budget().limit())?;
     let scene: &Scene<C> = kept
@@ -538,13 +549,19 @@ pub(super) fn prepare<'k, C: ColorModel>(ask: &'k mut Ask<'_>, color: C) -> Resu
         warnings.extend_from_slice(integrator_at(description, warning).problems());
     }
     warnings.extend(black::no_light(description, scene.light_count()));
+    let mut spent = kept.spent;
+    if ask.traced {
+        let mut seconds = 0.0;
+        timed(&mut seconds, || view.integrator.prepare(scene));
+        spent.build += seconds;
+    }
     Ok(Job {
         scene,
         facts,
         view,
         seed: options.seed,
         sensor: options.sensor,
-        spent: kept.spent,
+        spent,
         warnings,
     })
 }

@@ -122,7 +122,7 @@ fn integrator(name: &str, known: &Known) -> (String, f64) {
         "path" => (path, known.path),
         // Of what comes from the lights next to nothing falls on so small a film.
         "ptracer" => (path, f64::NAN),
-        "bdpt" | "volpath" | "volpathmis" => {
+        "bdpt" | "guided" | "volpath" | "volpathmis" => {
             let named = format!(r#"<integrator type="{name}">{roulette}</integrator>"#);
             (named, known.path)
         }

@@ -15,6 +15,7 @@ mod compare;
 mod crosscheck;
 mod filters;
 mod golden;
+mod guided;
 mod inputs;
 mod instances;
 mod known_radiance;
