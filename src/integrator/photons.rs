@@ -247,7 +247,7 @@ impl<C: ColorModel> Shooting<'_, C> {
                 false => Met::Nothing,
             };
         }
-        flight.flux = flight.flux * sample.weight;
+        flight.flux *= sample.weight;
         if flight.flux.is_black() {
             return Met::Nothing;
         }

@@ -111,7 +111,7 @@ fn scenes() -> Vec<(&'static str, String)> {
         (
             "a floor of ground glass",
             format!(
-                "{}{LAMP}{GLASS}",
+                "{}{LAMP}{GLASS}{sky}",
                 floor(r#"<bsdf type="roughdielectric"><float name="alpha" value="0.3"/></bsdf>"#)
             ),
         ),
@@ -266,7 +266,7 @@ fn parts_make_the_image_of_one_run() {
     run("render scene.xml -q -o a.part --crop 0,0,17,30 --passes 0:2");
     run("render scene.xml -q -o b.part --crop 17,0,23,30 --passes 0:2");
     run("render scene.xml -q -o c.part --passes 2:");
-    run("merge a.part b.part c.part -q -o merged.exr");
+    run("merge merged.exr a.part b.part c.part -q");
     let read = |name: &str| {
         let path = folder.path().join(name);
         let picture = etendue::image::read(&path, &Default::default());
