@@ -550,7 +550,7 @@ pub(super) fn prepare<'k, C: ColorModel>(ask: &'k mut Ask<'_>, color: C) -> Resu
     }
     warnings.extend(black::no_light(description, scene.light_count()));
     let mut spent = kept.spent;
-    if ask.traced {
+    if ask.traced && photons > 0 {
         let mut seconds = 0.0;
         timed(&mut seconds, || view.integrator.prepare(scene));
         spent.build += seconds;

@@ -42,10 +42,10 @@ const GLASS: &str = r#"<shape type="sphere"><point name="center" value="0.3, 0.1
 const RING: &str = r#"<shape type="cylinder"><point name="p0" value="0, 0, 0"/><point name="p1" value="0, 0, 0.6"/>
     <float name="radius" value="1"/><bsdf type="twosided"><bsdf type="conductor"/></bsdf></shape>"#;
 
-/// The mean of each channel over images of some seeds.
-fn means(text: &str) -> [Mean; 3] {
+/// The mean of each of the first channels over images of some seeds.
+fn means(image_of: impl Fn(u64) -> Image) -> [Mean; 3] {
     const SEEDS: u64 = 12;
-    let images: Vec<Image> = (0..SEEDS).map(|seed| image_of(text, seed)).collect();
+    let images: Vec<Image> = (0..SEEDS).map(image_of).collect();
     [0, 1, 2].map(|channel| {
         Mean::of(images.iter().map(|image| {
             let pixels = image.data().chunks(image.channels().len());
@@ -135,7 +135,8 @@ fn the_mean_is_that_of_paths_without_a_guide() {
         let [found, expected] = ["guided", "path"].map(|name| {
             let spp = if name == "path" { 256 } else { 128 };
             let head = format!("{}{}", integrator(name, 6), camera(12, 10, spp));
-            means(&scene(&format!("{head}{shapes}")))
+            let text = scene(&format!("{head}{shapes}"));
+            means(|seed| image_of(&text, seed))
         });
         for (found, expected) in found.iter().zip(&expected) {
             let error = found.error.hypot(expected.error);
@@ -149,6 +150,29 @@ fn the_mean_is_that_of_paths_without_a_guide() {
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// Glass that parts wavelengths, whose paths go on with one.
+#[cfg(feature = "bands")]
+#[test]
+fn in_bands_the_mean_is_that_of_paths_without_a_guide_too() {
+    let prism = r#"<shape type="sphere"><point name="center" value="0.3, 0.1, 0.8"/><float name="radius" value="0.7"/>
+        <bsdf type="dielectric"><spectrum name="int_ior" value="400:1.6, 700:1.4"/></bsdf></shape>"#;
+    let [found, expected] = ["guided", "path"].map(|name| {
+        let head = format!("{}{}", integrator(name, 6), camera(12, 10, 128));
+        let text = scene(&format!("{head}{FLOOR}{LAMP}{prism}"));
+        means(|seed| {
+            let options = Options {
+                seed,
+                colors: etendue::render::Colors::bands(5),
+                ..Options::default()
+            };
+            rendered(&text, &Overrides::default(), &options).image
+        })
+    });
+    for (found, expected) in found.iter().zip(&expected) {
+        found.assert_equals(expected, 0.03, "bands");
+    }
 }
 
 /// The mean variance of pixels, relative to the square of their mean.
@@ -263,10 +287,15 @@ fn parts_make_the_image_of_one_run() {
         assert!(output.status.success(), "{words}: {said}");
     };
     run("render scene.xml -q -o whole.exr");
-    run("render scene.xml -q -o a.part --crop 0,0,17,30 --passes 0:2");
-    run("render scene.xml -q -o b.part --crop 17,0,23,30 --passes 0:2");
-    run("render scene.xml -q -o c.part --passes 2:");
-    run("merge merged.exr a.part b.part c.part -q");
+    for (name, crop) in [("left", "0,0,17,30"), ("right", "17,0,23,30")] {
+        for passes in ["0:2", "2:5"] {
+            let part = format!("{name}{}.part", &passes[..1]);
+            run(&format!(
+                "render scene.xml -q -o {part} --crop {crop} --passes {passes}"
+            ));
+        }
+    }
+    run("merge merged.exr left0.part left2.part right0.part right2.part -q");
     let read = |name: &str| {
         let path = folder.path().join(name);
         let picture = etendue::image::read(&path, &Default::default());
