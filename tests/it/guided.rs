@@ -157,9 +157,9 @@ fn the_mean_is_that_of_paths_without_a_guide() {
 #[test]
 fn in_bands_the_mean_is_that_of_paths_without_a_guide_too() {
     let prism = r#"<shape type="sphere"><point name="center" value="0.3, 0.1, 0.8"/><float name="radius" value="0.7"/>
-        <bsdf type="dielectric"><spectrum name="int_ior" value="400:1.6, 700:1.4"/></bsdf></shape>"#;
+        <bsdf type="dielectric"><spectrum name="int_ior" value="300:1.6, 900:1.4"/></bsdf></shape>"#;
     let [found, expected] = ["guided", "path"].map(|name| {
-        let head = format!("{}{}", integrator(name, 6), camera(12, 10, 128));
+        let head = format!("{}{}", integrator(name, 6), camera(12, 10, 512));
         let text = scene(&format!("{head}{FLOOR}{LAMP}{prism}"));
         means(|seed| {
             let options = Options {
