@@ -139,7 +139,8 @@ pub(crate) fn zeros(count: usize, film: &Window) -> Result<Vec<f64>> {
         ))
         .help("render it in crops")
     })?;
-    data.resize(count, 0.0);
+    // Memory is given when it is written to first: by all threads.
+    data.par_extend((0..count).into_par_iter().map(|_| 0.0));
     Ok(data)
 }
 

@@ -49,6 +49,10 @@ impl<C: ColorModel> Bsdf<C> for BlendBsdf<C> {
         }
     }
 
+    fn is_matte(&self) -> bool {
+        self.nested.iter().all(|nested| nested.is_matte())
+    }
+
     fn passes(&self) -> bool {
         self.nested.iter().any(|nested| nested.passes())
     }

@@ -104,5 +104,9 @@ impl<C: ColorModel> Bsdf<C> for Diffuse<C> {
         Lobes::REFLECTION
     }
 
+    fn is_matte(&self) -> bool {
+        true
+    }
+
     single_face!();
 }

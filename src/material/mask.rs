@@ -72,6 +72,10 @@ impl<C: ColorModel> Bsdf<C> for Mask<C> {
         }
     }
 
+    fn is_matte(&self) -> bool {
+        self.nested.is_matte()
+    }
+
     fn passes(&self) -> bool {
         true
     }

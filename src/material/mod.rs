@@ -107,6 +107,11 @@ pub trait Bsdf<C: ColorModel>: std::fmt::Debug + Send + Sync {
         self.lobes().smooth
     }
 
+    /// Whether what it returns of light goes by the cosine of the light's direction alone, on the side from which it is seen.
+    fn is_matte(&self) -> bool {
+        false
+    }
+
     /// Whether light may go straight on through it as if nothing were there: see [`Material::passing_lanes`].
     fn passes(&self) -> bool {
         false

@@ -71,6 +71,10 @@ impl<C: ColorModel> Bsdf<C> for TwoSided<C> {
         }
     }
 
+    fn is_matte(&self) -> bool {
+        self.front.is_matte() && self.back.as_ref().is_none_or(|back| back.is_matte())
+    }
+
     fn passes(&self) -> bool {
         self.front.passes() || self.back.as_ref().is_some_and(|back| back.passes())
     }

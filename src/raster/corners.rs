@@ -80,9 +80,7 @@ impl Task for PlaceCorners<'_> {
                 F::load(&rows[1]).widen(),
                 F::load(&rows[2]).widen(),
             ];
-            let x = along::<F>(row(&matrix, 0), offset.x, p);
-            let y = along::<F>(row(&matrix, 1), offset.y, p);
-            let a = along::<F>(row(&matrix, 2), offset.z, p);
+            let [x, y, a] = transformed::<F>(&matrix, offset, p);
             let w = match projection.is_perspective() {
                 true => a,
                 false => wide(1.0),
@@ -152,18 +150,25 @@ impl<F: Lanes> Axis<F> {
     }
 }
 
-/// A row of a matrix.
+/// `matrix · p + offset`, with the bits of single vectors.
 #[inline(always)]
-fn row(matrix: &DMat3, row: usize) -> [f64; 3] {
-    let columns = [matrix.x_axis, matrix.y_axis, matrix.z_axis];
-    [columns[0][row], columns[1][row], columns[2][row]]
+pub(super) fn transformed<F: Lanes>(
+    matrix: &DMat3,
+    offset: DVec3,
+    p: [F::Double; 3],
+) -> [F::Double; 3] {
+    [
+        along::<F>(matrix.row(0), offset.x, p),
+        along::<F>(matrix.row(1), offset.y, p),
+        along::<F>(matrix.row(2), offset.z, p),
+    ]
 }
 
 /// The products' sum, in the order of a matrix's product with a vector.
 #[inline(always)]
-fn along<F: Lanes>(row: [f64; 3], offset: f64, [x, y, z]: [F::Double; 3]) -> F::Double {
+fn along<F: Lanes>(row: DVec3, offset: f64, [x, y, z]: [F::Double; 3]) -> F::Double {
     let wide = <F::Double as Doubles>::splat;
-    wide(row[0]) * x + wide(row[1]) * y + wide(row[2]) * z + wide(offset)
+    wide(row.x) * x + wide(row.y) * y + wide(row.z) * z + wide(offset)
 }
 
 #[cfg(test)]

@@ -5,12 +5,13 @@
 
 use std::borrow::Cow;
 use std::collections::HashMap;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use glam::{DMat3, DVec3, Vec2, Vec3};
+use rayon::prelude::*;
 
 use super::projection::Projection;
-use super::runs::Run;
+use super::runs::{self, Run};
 use crate::accel::{Standing, Tracer};
 use crate::error::{Error, Problem, Result};
 use crate::lanes::{self, Kernel};
@@ -26,9 +27,8 @@ pub(super) struct Facets<'s> {
     pub(super) positions: Cow<'s, [Vec3]>,
     pub(super) triangles: Cow<'s, [[u32; 3]]>,
     pub(super) kind: FacetsOf<'s>,
-    pub(super) runs: Vec<Run>,
-    /// Around all of them.
-    pub(super) bounds: Bounds,
+    /// Each once it has been drawn.
+    runs: Vec<OnceLock<Run>>,
 }
 
 /// Of what they are.
@@ -101,7 +101,6 @@ impl<'s> Drawn<'s> {
         time: f32,
         wanted: impl Fn(u32) -> bool,
     ) -> Result<Self> {
-        let kernel = tracer.kernel();
         let mut facets: Vec<Facets<'s>> = Vec::new();
         let mut known: HashMap<u32, usize> = HashMap::new();
         let mut missing: Vec<(u32, Untessellated)> = Vec::new();
@@ -131,7 +130,7 @@ impl<'s> Drawn<'s> {
                 Some(number) => *number,
                 None => {
                     let edge = longest.get(&shape).copied();
-                    match Facets::of(tracer.shape(shape), edge, projection, time, kernel) {
+                    match Facets::of(tracer.shape(shape), edge, projection, time) {
                         Ok(of_shape) => facets.push(of_shape),
                         Err(why) => {
                             missing.push((shape, why));
@@ -161,7 +160,7 @@ impl<'s> Drawn<'s> {
             facets: Arc::new(facets),
             placed,
             warnings: warnings.collect(),
-            kernel,
+            kernel: tracer.kernel(),
         })
     }
 
@@ -302,7 +301,6 @@ impl<'s> Facets<'s> {
         longest: Option<f32>,
         projection: &Projection,
         time: f32,
-        kernel: Kernel,
     ) -> Fallible<Self> {
         let (positions, triangles, kind) = match geometry {
             Geometry::Mesh(mesh) => {
@@ -356,15 +354,25 @@ impl<'s> Facets<'s> {
                 )
             }
         };
-        let runs = Run::all(kernel, &positions, &triangles);
-        let bounds = runs.iter().map(|run| run.bounds);
+        let runs = triangles.chunks(runs::LENGTH).map(|_| OnceLock::new());
         Ok(Self {
             geometry,
-            bounds: bounds.fold(Bounds::EMPTY, Bounds::union),
-            runs,
+            runs: runs.collect(),
             positions,
             triangles,
             kind,
+        })
+    }
+
+    /// The triangles by runs.
+    pub(super) fn runs(
+        &self,
+        kernel: Kernel,
+    ) -> impl IndexedParallelIterator<Item = (&Run, &[[u32; 3]])> {
+        let chunks = self.triangles.par_chunks(runs::LENGTH).zip(&self.runs);
+        chunks.map(move |(triangles, run)| {
+            let run = run.get_or_init(|| Run::of(kernel, &self.positions, triangles));
+            (run, triangles)
         })
     }
 

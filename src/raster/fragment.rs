@@ -32,7 +32,7 @@ pub struct Fragment {
 
 /// A triangle as its fragments need it, so that neighbours share what is the same for all of them.
 #[derive(Debug)]
-pub struct Face<'d, 's> {
+pub(super) struct Face<'d, 's> {
     projection: &'d Projection,
     placed: &'d Placed,
     facets: &'d Facets<'s>,
@@ -62,7 +62,7 @@ pub struct Attributes {
 
 impl<'d, 's> Face<'d, 's> {
     /// The triangle with that number.
-    pub fn new(drawn: &'d Drawn<'s>, projection: &'d Projection, number: u32) -> Self {
+    pub(super) fn new(drawn: &'d Drawn<'s>, projection: &'d Projection, number: u32) -> Self {
         let (placed, triangle) = drawn.find(number);
         let facets = drawn.facets(placed);
         let corners = facets.corners(triangle);
@@ -81,7 +81,7 @@ impl<'d, 's> Face<'d, 's> {
     }
 
     /// What is seen of it at a place, in pixels.
-    pub fn at(&self, at: DVec2) -> Fragment {
+    pub(super) fn at(&self, at: DVec2) -> Fragment {
         let Self {
             projection,
             placed,

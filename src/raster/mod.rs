@@ -3,7 +3,7 @@
 //!
 //! The steps: `projection` takes places in the picture from the sensor's own rays; `drawn` makes triangles of all shapes, by
 //! `runs`; `corners`, `sift`, `clip`, `setup` and `depth` bring them to samples of the picture, which `visibility` does for all
-//! of them in parallel; `fragment` says what is seen at a sample, `shade` what it looks like, with the help of `shadow`;
+//! of them in parallel; `fragment` says what is seen at a sample, and `fragments` at many, `shade` what it looks like, with the help of `shadow`;
 //! `agreement` holds fragments against rays.
 
 mod projection;
@@ -19,6 +19,7 @@ mod runs;
 
 mod drawn;
 mod fragment;
+mod fragments;
 mod visibility;
 
 mod shade;
@@ -29,7 +30,8 @@ mod agreement;
 pub use agreement::{ALLOWED, Agreement, Quantity, TOLERANCE, agreement};
 pub use depth::DepthFormat;
 pub use drawn::Drawn;
-pub use fragment::{Attributes, Face, Fragment};
+pub use fragment::{Attributes, Fragment};
+pub use fragments::{Fragments, Look, Seen};
 pub use pattern::{COUNTS, Pattern};
 pub use projection::{Line, Place, Projection};
 pub use shade::{Batch, Blocked, Lighting, ShadeSettings, Shader, Shading};

@@ -4,7 +4,6 @@
 use std::ops::RangeInclusive;
 
 use glam::Vec3;
-use rayon::prelude::*;
 
 use crate::lanes::{Kernel, Lanes, Task};
 use crate::shape::Bounds;
@@ -22,26 +21,23 @@ pub(super) struct Run {
 }
 
 impl Run {
-    /// Those of a shape.
-    pub(super) fn all(kernel: Kernel, positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Self> {
-        let runs = triangles.par_chunks(LENGTH).map(|triangles| {
-            let corners = kernel.run(Span(triangles));
-            let is_dense = ((corners.end() - corners.start()) as usize) < 3 * triangles.len();
-            let bounds = match is_dense {
-                true => around(&positions[*corners.start() as usize..=*corners.end() as usize]),
-                false => around(
-                    triangles
-                        .as_flattened()
-                        .iter()
-                        .map(|i| &positions[*i as usize]),
-                ),
-            };
-            Self {
-                corners: is_dense.then_some(corners),
-                bounds,
-            }
-        });
-        runs.collect()
+    /// That of some triangles.
+    pub(super) fn of(kernel: Kernel, positions: &[Vec3], triangles: &[[u32; 3]]) -> Self {
+        let corners = kernel.run(Span(triangles));
+        let is_dense = ((corners.end() - corners.start()) as usize) < 3 * triangles.len();
+        let bounds = match is_dense {
+            true => around(&positions[*corners.start() as usize..=*corners.end() as usize]),
+            false => around(
+                triangles
+                    .as_flattened()
+                    .iter()
+                    .map(|i| &positions[*i as usize]),
+            ),
+        };
+        Self {
+            corners: is_dense.then_some(corners),
+            bounds,
+        }
     }
 }
 
@@ -87,7 +83,10 @@ mod tests {
         let far = (0..10).map(|i| [i + 3, i + 1, count - 1 - i]);
         let triangles: Vec<[u32; 3]> = near.chain(far).collect();
         for kernel in Kernel::all() {
-            let runs = Run::all(kernel, &positions, &triangles);
+            let chunks = triangles.chunks(LENGTH);
+            let runs: Vec<Run> = chunks
+                .map(|part| Run::of(kernel, &positions, part))
+                .collect();
             assert_eq!(runs.len(), 2);
             let last = LENGTH as u32 + 1;
             assert_eq!(runs[0].corners, Some(0..=last));

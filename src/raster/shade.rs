@@ -9,7 +9,7 @@ use std::f32::consts::FRAC_1_PI;
 use glam::{Vec2, Vec3};
 
 use super::drawn::Drawn;
-use super::fragment::Fragment;
+use super::fragments::{Look, Seen};
 use super::projection::Projection;
 use super::shadow::{ShadowMap, ShadowSettings, Source};
 use crate::accel::Met;
@@ -197,17 +197,16 @@ impl<'s, C: ColorModel> Shader<'s, C> {
         )
     }
 
-    /// Adds to a batch the points whose colours make up that of the fragment with that number, which `ray` goes to, and tells of
-    /// each its weight: the fragment itself, or the corners of its triangle.
+    /// Adds to a batch the points whose colours make up that of what is seen, and tells of each its weight: the point itself,
+    /// or the corners of its triangle.
     pub fn add_points(
         &self,
-        batch: &mut Batch,
+        (batch, weights): (&mut Batch, &mut Vec<f32>),
         (drawn, projection): (&Drawn<'_>, &Projection),
-        number: u32,
-        (ray, fragment): (&Ray, &Fragment),
-        weights: &mut Vec<f32>,
+        look: &Look,
+        seen: &Seen,
     ) {
-        let hit = fragment.hit_of(ray);
+        let (ray, hit) = (&look.ray, seen.hit);
         let mut add = |ray: Ray, hit: Hit, steps: [Vec3; 2], weight: f32| {
             batch.rays.push(ray);
             batch.hits.push(hit);
@@ -217,12 +216,12 @@ impl<'s, C: ColorModel> Shader<'s, C> {
             weights.push(weight);
         };
         if self.settings.shading == Shading::Phong {
-            let steps = projection.steps(fragment.a).map(|step| step.as_vec3());
+            let steps = projection.steps(seen.a.into()).map(|step| step.as_vec3());
             add(*ray, hit, steps, 1.0);
             return;
         }
         let of_mesh = self.scene.tracer().shape(hit.shape).mesh().is_some();
-        let corners = drawn.corners(number).into_iter().zip(fragment.weights);
+        let corners = drawn.corners(look.number).into_iter().zip(seen.weights);
         for (corner, (place, weight)) in corners.enumerate() {
             let place = place.as_vec3();
             let (origin, direction) = match projection.is_perspective() {
@@ -244,7 +243,7 @@ impl<'s, C: ColorModel> Shader<'s, C> {
                 v: at(2),
                 ..hit
             };
-            add(to_corner, hit, [Vec3::ZERO; 2], weight as f32);
+            add(to_corner, hit, [Vec3::ZERO; 2], weight);
         }
     }
 
@@ -393,14 +392,7 @@ impl<C: ColorModel> OfOneMaterial<'_, '_, C> {
         };
         for lamp in lamps {
             match lamp {
-                Lamp::Around(around) => {
-                    let mut sum = C::Columns::<F>::zero();
-                    for (direction, brought) in around {
-                        let returned = self.returned(at, lanes::Vec3::all(*direction), w);
-                        sum = sum + returned * C::Columns::<F>::from_samples(|_| *brought);
-                    }
-                    lit = lit + sum * unit;
-                }
+                Lamp::Around(around) => lit = lit + self.returned_around(at, around, w) * unit,
                 Lamp::Single(id, map) => {
                     let light = &scene.lights()[id.index()];
                     let sample = light.sample_lanes(at, lanes::Vec2::all(MIDDLE), w, at.active);
@@ -426,6 +418,30 @@ impl<C: ColorModel> OfOneMaterial<'_, '_, C> {
             }
         }
         lit
+    }
+
+    /// What the material returns of light from all around. A matte one is asked once, along its normal, as the rest is cosines.
+    #[inline(always)]
+    fn returned_around<F: Lanes>(
+        &self,
+        at: &Points<'_, F>,
+        around: &[(Vec3, C::Sample)],
+        w: &[C::Wavelengths],
+    ) -> C::Columns<F> {
+        let mut sum = C::Columns::<F>::zero();
+        if !self.material.is_matte() {
+            for (direction, brought) in around {
+                let returned = self.returned(at, lanes::Vec3::all(*direction), w);
+                sum = sum + returned * C::Columns::<F>::from_samples(|_| *brought);
+            }
+            return sum;
+        }
+        let normal = at.frame.n * F::one().copysign(at.wi.z);
+        for (direction, brought) in around {
+            let cosine = normal.dot(lanes::Vec3::all(*direction)).max(F::zero());
+            sum = sum + C::Columns::<F>::from_samples(|_| *brought) * cosine;
+        }
+        self.returned(at, normal, w) * sum
     }
 
     /// What the material returns of light from a direction, by Phong's equation.

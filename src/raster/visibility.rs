@@ -256,9 +256,6 @@ impl Painter<'_> {
             let around = bounds.corners().map(|corner| placing.place(corner));
             self.projection.misses(&around, &self.window)
         };
-        if is_missed(&facets.bounds) {
-            return Vec::new();
-        }
         // A triangle turns as its corners do: seen with y down a front is turned where the matrix does not mirror.
         let front = matrix.determinant() > 0.0;
         let keep = |is_turned: bool| match cull {
@@ -266,40 +263,38 @@ impl Painter<'_> {
             Cull::Back => is_turned == front,
             Cull::Front => is_turned != front,
         };
-        let runs = facets.triangles.par_chunks(runs::LENGTH).zip(&facets.runs);
-        let high = runs
-            .enumerate()
-            .map_init(Stage::default, |stage, (i, (triangles, run))| {
-                let mut high = Vec::new();
-                if is_missed(&run.bounds) {
-                    return high;
+        let runs = facets.runs(drawn.kernel()).enumerate();
+        let high = runs.map_init(Stage::default, |stage, (i, (run, triangles))| {
+            let mut high = Vec::new();
+            if is_missed(&run.bounds) {
+                return high;
+            }
+            let run = (run, triangles);
+            let count = stage.place(drawn.kernel(), &placing, &facets.positions, run);
+            let first = placed.first + (i * runs::LENGTH) as u32;
+            for i in &stage.found[..count] {
+                let (triangle, number) = (triangles[*i as usize], first + i);
+                let three = stage.corners(triangles, *i);
+                let places = || triangle.map(|i| placing.place(facets.positions[i as usize]));
+                let [a, b, c] = three.each_ref().map(Corner::beyond);
+                if a & b & c != 0 {
+                    continue;
                 }
-                let run = (run, triangles);
-                let count = stage.place(drawn.kernel(), &placing, &facets.positions, run);
-                let first = placed.first + (i * runs::LENGTH) as u32;
-                for i in &stage.found[..count] {
-                    let (triangle, number) = (triangles[*i as usize], first + i);
-                    let three = stage.corners(triangles, *i);
-                    let places = || triangle.map(|i| placing.place(facets.positions[i as usize]));
-                    let [a, b, c] = three.each_ref().map(Corner::beyond);
-                    if a & b & c != 0 {
-                        continue;
-                    }
-                    if a | b | c != 0 {
-                        self.cut(places(), |facet, linear| {
-                            if keep(facet.is_turned) {
-                                self.fill_or_leave(facet, number, || linear, &mut high);
-                            }
-                        });
-                    } else if let Some(facet) = self.grid.triangle(three)
-                        && keep(facet.is_turned)
-                    {
-                        let linear = || places().map(|place| self.code.linear(place.a));
-                        self.fill_or_leave(facet, number, linear, &mut high);
-                    }
+                if a | b | c != 0 {
+                    self.cut(places(), |facet, linear| {
+                        if keep(facet.is_turned) {
+                            self.fill_or_leave(facet, number, || linear, &mut high);
+                        }
+                    });
+                } else if let Some(facet) = self.grid.triangle(three)
+                    && keep(facet.is_turned)
+                {
+                    let linear = || places().map(|place| self.code.linear(place.a));
+                    self.fill_or_leave(facet, number, linear, &mut high);
                 }
-                high
-            });
+            }
+            high
+        });
         high.flatten_iter().collect()
     }
 

@@ -22,7 +22,7 @@ use crate::integrator::Raster;
 use crate::interaction::Ray;
 use crate::lanes::{self, Lanes, MAX_LANES, Task};
 use crate::material::Material;
-use crate::raster::{Batch, Canvas, Drawn, Face, Projection, Shader, Visibility};
+use crate::raster::{Batch, Canvas, Drawn, Fragments, Look, Projection, Seen, Shader, Visibility};
 use crate::scene::Scene;
 use crate::sensor::{Film, Sensor, Window};
 
@@ -31,8 +31,6 @@ pub(super) const NAME: &str = "raster";
 
 /// Rows of pixels of a unit of work.
 const ROWS: u32 = 16;
-/// So many fragments before a triangle is looked at its memory is asked for, as that of a fine mesh is far off.
-const AHEAD: usize = 8;
 
 /// Whether a render's image is drawn by the z-buffer, so that no ray is traced.
 pub(super) fn draws(description: &Description, options: &Options) -> bool {
@@ -211,6 +209,9 @@ struct Row {
     parts: Vec<Part>,
     /// To each of these.
     rays: Vec<Ray>,
+    /// At those where a triangle is seen.
+    looks: Vec<Look>,
+    seen: Vec<Seen>,
 }
 
 /// What is seen at some of a pixel's samples.
@@ -232,6 +233,8 @@ impl Row {
         self.weights.clear();
         self.parts.clear();
         self.rays.clear();
+        self.looks.clear();
+        self.seen.clear();
     }
 }
 
@@ -344,32 +347,28 @@ impl<C: ColorModel> Picture<'_, C> {
             rays: &mut row.rays,
         });
         let (drawn, projection) = (&self.drawn, &self.projection);
-        let mut last: Option<(u32, Face<'_, '_>)> = None;
-        for (i, ray) in row.rays.iter().enumerate() {
-            let number = |i: usize| row.parts.get(i).and_then(|part| part.number);
-            if let Some(number) = number(i + 2 * AHEAD) {
-                drawn.fetch(number);
-            }
-            if let Some(number) = number(i + AHEAD) {
-                drawn.fetch_corners(number);
-            }
-            let part = &mut row.parts[i];
+        let looks = row.parts.iter().zip(&row.rays).filter_map(|(part, ray)| {
+            Some(Look {
+                place: part.place,
+                number: part.number?,
+                ray: *ray,
+            })
+        });
+        row.looks.extend(looks);
+        self.scene.tracer().kernel().run(Fragments {
+            drawn,
+            projection,
+            looks: &row.looks,
+            to: &mut row.seen,
+        });
+        let mut found = row.looks.iter().zip(&row.seen);
+        for part in &mut row.parts {
             let first = row.weights.len();
-            if let Some(number) = part.number {
-                let face = match last.take() {
-                    Some(face) if face.0 == number => face,
-                    _ => (number, Face::new(drawn, projection, number)),
-                };
-                let fragment = face.1.at(part.place);
-                last = Some(face);
+            if part.number.is_some() {
+                let (look, seen) = found.next().expect("it was looked at");
                 // All shaders want the same points.
-                self.shaders[0].add_points(
-                    &mut row.batch,
-                    (drawn, projection),
-                    number,
-                    (ray, &fragment),
-                    &mut row.weights,
-                );
+                let to = (&mut row.batch, &mut row.weights);
+                self.shaders[0].add_points(to, (drawn, projection), look, seen);
             }
             part.points = first..row.weights.len();
         }
