@@ -7,6 +7,7 @@ pub mod error;
 pub mod budget;
 pub mod file;
 pub mod math;
+pub(crate) mod pages;
 
 pub mod lanes;
 

@@ -11,6 +11,6 @@ pub(crate) use blocks::{BLOCK, Blocks, Grid, Record};
 pub(crate) use layout::Layout;
 pub(crate) use splat::{GROUP, Group};
 pub(crate) use splats::Splats;
-pub(crate) use sums::{Accumulator, Summed, Sums, Tally, Times};
+pub(crate) use sums::{Accumulator, Rows, Summed, Sums, Tally, Times};
 
 use sums::zeros;

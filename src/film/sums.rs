@@ -14,6 +14,7 @@ use crate::filter::Filter;
 use crate::image::Image;
 use crate::integrator::{Cost, Stats};
 use crate::lanes::Kernel;
+use crate::pages;
 use crate::sensor::{Coordinates, Film, Window};
 
 /// Pixels that one task develops.
@@ -129,19 +130,48 @@ pub(crate) struct Sums {
     pub(crate) tally: Tally,
 }
 
+/// The sums of some rows, to be filled.
+#[derive(Debug)]
+pub(crate) struct Rows<'a> {
+    window: Window,
+    stride: usize,
+    data: &'a mut [f64],
+    tally: Tally,
+}
+
+impl Rows<'_> {
+    /// The pixels that they are of.
+    pub(crate) fn window(&self) -> &Window {
+        &self.window
+    }
+
+    /// Adds a sample of a pixel of the window, a value a channel, in that pixel alone.
+    pub(crate) fn put(&mut self, pixel: [u32; 2], values: &[f32]) {
+        if !values.iter().all(|value| value.is_finite()) {
+            self.tally.drop(pixel, 1);
+            return;
+        }
+        let row = (pixel[1] - self.window.y) as usize * self.window.width as usize;
+        let first = (row + (pixel[0] - self.window.x) as usize) * self.stride;
+        let [weight, sums @ ..] = &mut self.data[first..] else {
+            return;
+        };
+        *weight += 1.0;
+        for (sum, value) in sums.iter_mut().zip(values) {
+            *sum += f64::from(*value);
+        }
+    }
+}
+
 /// So many zeros, unless the memory for them is not there.
 pub(crate) fn zeros(count: usize, film: &Window) -> Result<Vec<f64>> {
-    let mut data = Vec::new();
-    data.try_reserve_exact(count).map_err(|_| {
+    pages::filled(count, || 0.0).map_err(|_| {
         Error::input(format!(
             "a film of {} × {} pixels does not fit into memory",
             film.width, film.height
         ))
         .help("render it in crops")
-    })?;
-    // Memory is given when it is written to first: by all threads.
-    data.par_extend((0..count).into_par_iter().map(|_| 0.0));
-    Ok(data)
+    })
 }
 
 impl Accumulator for Sums {
@@ -202,20 +232,27 @@ impl Sums {
         self.tally.drop(group.pixel, dropped);
     }
 
-    /// Adds a sample of a pixel of the window, a value a channel, in that pixel alone.
-    pub(crate) fn put(&mut self, pixel: [u32; 2], values: &[f32]) {
-        if !values.iter().all(|value| value.is_finite()) {
-            self.tally.drop(pixel, 1);
-            return;
-        }
-        let row = (pixel[1] - self.window.y) as usize * self.window.width as usize;
-        let first = (row + (pixel[0] - self.window.x) as usize) * self.layout.stride();
-        let [weight, sums @ ..] = &mut self.data[first..] else {
-            return;
-        };
-        *weight += 1.0;
-        for (sum, value) in sums.iter_mut().zip(values) {
-            *sum += f64::from(*value);
+    /// Fills the pixels by all threads at once, so many rows at a time.
+    pub(crate) fn fill(&mut self, rows: u32, fill: impl Fn(&mut Rows<'_>) + Sync) {
+        let (window, stride) = (self.window, self.layout.stride());
+        let row = window.width as usize * stride;
+        let chunks = self.data.par_chunks_mut((row * rows as usize).max(1));
+        let tallies = chunks.enumerate().map(|(i, data)| {
+            let mut rows = Rows {
+                window: Window {
+                    y: window.y + i as u32 * rows,
+                    height: (data.len() / row) as u32,
+                    ..window
+                },
+                stride,
+                data,
+                tally: Tally::default(),
+            };
+            fill(&mut rows);
+            rows.tally
+        });
+        for tally in tallies.collect::<Vec<_>>() {
+            self.tally.add(&tally);
         }
     }
 

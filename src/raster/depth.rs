@@ -7,6 +7,7 @@
 //! that are close to each other fight.
 
 use super::projection::Projection;
+use crate::lanes::{Doubles, Ints, Lanes};
 
 /// How depth is kept.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -70,6 +71,19 @@ impl DepthCode {
         };
         // Positive floats are ordered as integers are.
         (reciprocal as f32).to_bits().max(1)
+    }
+
+    /// [`DepthCode::code`] of floats, by `a`.
+    #[inline(always)]
+    pub(super) fn codes<F: Lanes>(&self, a: F::Double) -> <F::Int as Ints>::Row {
+        let wide = <F::Double as Doubles>::splat;
+        let along = match self.is_perspective {
+            true => a,
+            false => wide(self.near) + a,
+        };
+        let mut codes = F::Int::ROW;
+        (wide(1.0) / along).narrow().to_bits().store(&mut codes);
+        codes
     }
 }
 

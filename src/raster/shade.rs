@@ -489,12 +489,7 @@ impl<C: ColorModel> OfOneMaterial<'_, '_, C> {
         let Some(map) = map else {
             return F::one();
         };
-        let (positions, cosines) = (at.position.rows(), at.normal.dot(sample.direction).row());
-        for lane in asked.lanes() {
-            let position = lanes::Vec3::<F>::of(&positions, lane);
-            shares[lane] = map.lit(position, cosines[lane]);
-        }
-        F::load(&shares)
+        map.lit(at.position, at.normal.dot(sample.direction), asked)
     }
 }
 

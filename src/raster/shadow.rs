@@ -8,11 +8,13 @@
 
 use glam::{DMat3, DVec2, DVec3, Vec3};
 
+use super::corners::transformed;
 use super::depth::{DepthCode, DepthFormat};
 use super::drawn::Drawn;
 use super::projection::Projection;
 use super::visibility::{Canvas, Visibility};
 use crate::error::Result;
+use crate::lanes::{self, Doubles, Lanes, Mask};
 use crate::shape::Bounds;
 
 /// How maps are made and asked.
@@ -106,37 +108,68 @@ impl ShadowMap {
         Ok(Self { settings, faces })
     }
 
-    /// How much of the light a point receives whose surface's normal and the light's direction have that cosine, in [0, 1].
-    pub(super) fn lit(&self, position: Vec3, cosine: f32) -> f32 {
-        let (size, filter) = (f64::from(self.settings.size), self.settings.filter.max(1));
-        let found = self.faces.iter().find_map(|face| {
-            let place = face.projection.place(position.as_dvec3());
-            let [near, far] = face.projection.range();
-            let (x, y) = (place.x / place.w, place.y / place.w);
-            let inside = |v: f64| (0.0..size).contains(&v);
-            let seen = (near..=far).contains(&place.a) && inside(x) && inside(y);
-            seen.then_some((face, place.a, x, y))
-        });
+    /// How much of the light the `asked` of some points receive, in [0, 1]; the cosines are those between the surfaces' normals
+    /// and the light's direction.
+    #[inline(always)]
+    pub(super) fn lit<F: Lanes>(&self, position: lanes::Vec3<F>, cosine: F, asked: F::Mask) -> F {
+        let wide = <F::Double as Doubles>::splat;
+        let position = [position.x.widen(), position.y.widen(), position.z.widen()];
+        let cosine = cosine.abs().max(F::splat(0.1));
+        let slope = (F::one() - cosine * cosine).max(F::zero()).sqrt() / cosine;
+        let texels = 0.75 * (self.settings.filter.max(1) + 1) as f32;
+        let texels = ((slope + F::splat(0.1)) * F::splat(texels)).widen();
         // What no map covers has nothing before it.
-        let Some((face, a, x, y)) = found else {
-            return 1.0;
-        };
-        let bias = self.settings.bias.unwrap_or_else(|| {
-            let cosine = f64::from(cosine.abs()).max(0.1);
-            let slope = (1.0 - cosine * cosine).max(0.0).sqrt() / cosine;
-            let texels = 0.5 * f64::from(filter) + 0.5;
-            face.projection.pixel(a) * texels * (slope + 0.1) * 1.5
-        });
-        let begin = face.projection.range()[0];
-        let code = face.code.code(face.code.linear((a - bias).max(begin)));
-        let texel = |v: f64, step: u32| {
-            let first = v - 0.5 * f64::from(filter - 1);
-            (first + f64::from(step)).clamp(0.0, size - 1.0) as usize
+        let mut lit = F::one().row();
+        let mut left = asked;
+        for face in &self.faces {
+            let [x, y, a] = {
+                let (matrix, offset) = face.projection.along_ways(None);
+                transformed::<F>(&matrix, offset, position)
+            };
+            let is_perspective = face.projection.is_perspective();
+            let (x, y) = match is_perspective {
+                true => ((x / a).narrow(), (y / a).narrow()),
+                false => (x.narrow(), y.narrow()),
+            };
+            let [near, far] = face.projection.range();
+            let size = F::splat(self.settings.size as f32);
+            let inside = wide(near.next_down()).lt(a)
+                & a.lt(wide(far.next_up()))
+                & F::zero().le(x)
+                & x.lt(size)
+                & F::zero().le(y)
+                & y.lt(size)
+                & left;
+            if !inside.any() {
+                continue;
+            }
+            let bias = match (self.settings.bias, is_perspective) {
+                (Some(bias), _) => wide(bias),
+                (None, true) => texels * a * wide(face.projection.pixel(1.0)),
+                (None, false) => texels * wide(face.projection.pixel(1.0)),
+            };
+            let codes = face.code.codes::<F>((a - bias).max(wide(near)));
+            let (x, y) = (x.row(), y.row());
+            for lane in inside.lanes() {
+                lit[lane] = self.share(face, [x[lane], y[lane]], codes[lane]);
+            }
+            left = left & !inside;
+        }
+        F::load(&lit)
+    }
+
+    /// The share of texels around a place that see nothing nearer.
+    #[inline(always)]
+    fn share(&self, face: &Face, [x, y]: [f32; 2], code: u32) -> f32 {
+        let (size, filter) = (self.settings.size as usize, self.settings.filter.max(1));
+        let texel = |v: f32, step: u32| {
+            let first = v - 0.5 * (filter - 1) as f32;
+            ((first + step as f32).max(0.0) as usize).min(size - 1)
         };
         let mut lit = 0;
         for row in 0..filter {
             for column in 0..filter {
-                let pixel = texel(y, row) * self.settings.size as usize + texel(x, column);
+                let pixel = texel(y, row) * size + texel(x, column);
                 lit += u32::from(face.seen.depth(pixel, 0) <= code);
             }
         }
@@ -159,6 +192,10 @@ mod tests {
         ShadowMap::draw(source, &drawn, &scene.tracer().bounds(), settings).unwrap()
     }
 
+    fn at(map: &ShadowMap, position: Vec3, cosine: f32) -> f32 {
+        map.lit::<f32>(position.into(), cosine, Mask::splat(true))
+    }
+
     const SETTINGS: ShadowSettings = ShadowSettings {
         size: 512,
         bias: None,
@@ -178,10 +215,10 @@ mod tests {
                 if (x - half).abs() < 0.03 {
                     continue; // a texel
                 }
-                let lit = map.lit(Vec3::new(x, 0.3, 0.0), 1.0);
+                let lit = at(&map, Vec3::new(x, 0.3, 0.0), 1.0);
                 assert_eq!(lit, if x < half { 0.0 } else { 1.0 }, "{source:?} {x}");
             }
-            assert_eq!(map.lit(Vec3::new(0.2, 0.3, 1.0), 1.0), 1.0, "{source:?}");
+            assert_eq!(at(&map, Vec3::new(0.2, 0.3, 1.0), 1.0), 1.0, "{source:?}");
         }
     }
 
@@ -194,7 +231,7 @@ mod tests {
                 let i = i as f32;
                 Vec3::new(x + 0.3 * (i * 0.37).sin(), -0.3 * (i * 0.73).cos(), 0.0)
             });
-            points.map(|p| map.lit(p, -direction.z)).sum::<f32>() / 1000.0
+            points.map(|p| at(&map, p, -direction.z)).sum::<f32>() / 1000.0
         };
         [mean(5.0), mean(-1.4)]
     }
@@ -227,7 +264,7 @@ mod tests {
             },
         );
         let values: Vec<f32> = (0..100)
-            .map(|i| map.lit(Vec3::new(0.02 * i as f32, 0.1, 0.0), 1.0))
+            .map(|i| at(&map, Vec3::new(0.02 * i as f32, 0.1, 0.0), 1.0))
             .collect();
         assert!(
             values.is_sorted() && values[0] == 0.0 && values[99] == 1.0,

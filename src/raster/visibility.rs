@@ -20,6 +20,7 @@ use super::setup::{Corner, Facet, Grid};
 use super::sift::Sift;
 use crate::error::{Error, Result};
 use crate::lanes::Kernel;
+use crate::pages;
 use crate::sensor::Window;
 use crate::shape::Bounds;
 
@@ -96,16 +97,13 @@ impl Visibility {
         let samples = pattern.count();
         let size = [window.width, window.height];
         let count = size[0] as usize * size[1] as usize * samples;
-        let mut keys = Vec::new();
-        keys.try_reserve_exact(count).map_err(|_| {
+        let keys = pages::filled(count, AtomicU64::default).map_err(|_| {
             let [width, height] = size;
             Error::input(format!(
                 "a z-buffer of {width} × {height} pixels of {samples} samples does not fit into memory"
             ))
             .help("take fewer samples, or render it in crops")
         })?;
-        // Memory is given when it is written to first: by all threads.
-        keys.par_extend((0..count).into_par_iter().map(|_| AtomicU64::default()));
         let grid = Grid::new(picture, &window, &pattern);
         let painter = Painter {
             keys: &keys,

@@ -3,6 +3,7 @@
 //! and sampler have no part in it.
 
 use std::ops::Range;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::DVec2;
 
@@ -11,11 +12,10 @@ use super::origin::Outcome;
 use super::plan::Completed;
 use super::prepare::View;
 use super::progress::{Phase, Progress};
-use super::unit;
 use crate::color::{ColorModel, Spectral as _};
 use crate::description::{Description, Kind};
 use crate::error::{Error, Problem, Result};
-use crate::film::{Accumulator as _, Layout, Sums};
+use crate::film::{Layout, Rows, Sums};
 use crate::filter::Filter;
 use crate::image::Image;
 use crate::integrator::Raster;
@@ -132,15 +132,15 @@ pub(super) fn draw<C: ColorModel>(
     let bands = crop.height.div_ceil(ROWS) as usize;
     let pixels = u64::from(crop.width) * u64::from(crop.height);
     progress.begin(Phase::Render, pixels);
-    let add = |part: Sums| {
-        sums.add(&part);
-        Ok::<_, Error>(())
-    };
-    let done = unit::run(0..bands, progress, add, |band| {
-        let part = picture.band(band as u32);
-        progress.advance(u64::from(part.window().height) * u64::from(crop.width), 0);
-        part
-    })?;
+    let done = AtomicUsize::new(0);
+    sums.fill(ROWS, |rows| {
+        if !progress.stop() {
+            picture.draw(rows);
+            progress.advance(u64::from(rows.window().height) * u64::from(crop.width), 0);
+            done.fetch_add(1, Ordering::Relaxed);
+        }
+    });
+    let done = done.into_inner();
     Ok(Rastered {
         sums,
         completed: Completed {
@@ -260,20 +260,13 @@ impl Part {
 
 impl<C: ColorModel> Picture<'_, C> {
     /// Some rows.
-    fn band(&self, band: u32) -> Sums {
+    fn draw(&self, rows: &mut Rows<'_>) {
         let crop = self.film.crop;
-        let top = band * ROWS;
-        let window = Window {
-            x: crop.x,
-            y: crop.y + top,
-            width: crop.width,
-            height: ROWS.min(crop.height - top),
-        };
-        let mut sums = Sums::new(window, self.layout.clone()).expect("a band is small");
+        let window = *rows.window();
         let [mut values, mut pixel] = [(); 2].map(|()| vec![0.0; self.layout.count()]);
         let mut row = Row::default();
         let mut colors = vec![Vec::new(); self.shaders.len()];
-        for y in top..top + window.height {
+        for y in window.y - crop.y..window.y - crop.y + window.height {
             self.look(y, &mut row);
             for (shader, colors) in self.shaders.iter().zip(&mut colors) {
                 shader.shade(&row.batch, None, colors);
@@ -296,10 +289,9 @@ impl<C: ColorModel> Picture<'_, C> {
                     }
                     self.layout.take(pass, &values, pixel.iter_mut());
                 }
-                sums.put([crop.x + parts[0].column, crop.y + y], &pixel);
+                rows.put([crop.x + parts[0].column, crop.y + y], &pixel);
             }
         }
-        sums
     }
 
     /// What is seen in the pixels of a row: each triangle in one is shaded where the first of its samples lies, or in the pixel's

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 /// The modules from the ground up. Those in one row are siblings and do not import each other.
 const LAYERS: &[&[&str]] = &[
     &["error"],
-    &["budget", "file", "math"],
+    &["budget", "file", "math", "pages"],
     &["lanes"],
     &["color"],
     &["description", "image", "mesh"],
