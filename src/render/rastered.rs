@@ -308,27 +308,30 @@ impl<C: ColorModel> Picture<'_, C> {
         let count = pattern.count();
         for x in 0..width {
             let pixel = y as usize * width as usize + x as usize;
+            let mut part = |number, samples: usize, [dx, dy]: [f64; 2]| {
+                row.parts.push(Part {
+                    column: x,
+                    share: samples as f32 / count as f32,
+                    place: DVec2::new(f64::from(left + x) + dx, f64::from(top + y) + dy),
+                    number,
+                    points: 0..0,
+                });
+            };
+            let first = self.seen.number(pixel, 0);
+            if (1..count).all(|sample| self.seen.number(pixel, sample) == first) {
+                part(first, count, [0.5; 2]);
+                continue;
+            }
             let mut numbers = [None; 16];
             for (sample, number) in numbers.iter_mut().take(count).enumerate() {
                 *number = self.seen.number(pixel, sample);
             }
             let numbers = &numbers[..count];
             for (sample, number) in numbers.iter().enumerate() {
-                if numbers[..sample].contains(number) {
-                    continue;
+                if !numbers[..sample].contains(number) {
+                    let samples = numbers.iter().filter(|other| *other == number).count();
+                    part(*number, samples, pattern.place(sample));
                 }
-                let samples = numbers.iter().filter(|other| *other == number).count();
-                let [dx, dy] = match samples == count {
-                    true => [0.5; 2],
-                    false => pattern.place(sample),
-                };
-                row.parts.push(Part {
-                    column: x,
-                    share: samples as f32 / count as f32,
-                    place: DVec2::new(f64::from(left + x) + dx, f64::from(top + y) + dy),
-                    number: *number,
-                    points: 0..0,
-                });
             }
         }
         self.scene.tracer().kernel().run(RaysThrough {
