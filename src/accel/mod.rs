@@ -199,6 +199,8 @@ pub struct Tracer {
     inner_levels: usize,
     /// Whether any tree moves.
     deforms: bool,
+    /// Whether any tree has items that are no triangles.
+    has_others: bool,
     /// Whether the trees do not fit into the caches near a core.
     is_large: bool,
     method: Method,
@@ -260,6 +262,7 @@ impl Tracer {
             instance_bounds,
             inner_levels: inner.max().unwrap_or(0),
             deforms: groups.iter().any(Group::deforms),
+            has_others: groups.iter().any(|group| !group.items().is_empty()),
             is_large: groups.iter().map(Group::bytes).sum::<usize>() > CACHED,
             groups,
             method: recipe.method,

@@ -92,6 +92,7 @@ impl<'t> Walk<'t> {
             inner_levels: tracer.inner_levels,
             fetch: tracer.is_large,
             later: tracer.deforms,
+            others: tracer.has_others,
         };
         tree.batch::<_, ANY>(kernel, needs, &mut party, count, &mut counts);
         self.counts.add(&counts);
@@ -277,7 +278,7 @@ impl<'t> Door<'t> {
     }
 
     /// As the walk through the world's tree would come to it.
-    #[inline(always)]
+    #[inline(never)]
     fn start(&self, ray: &Ray, best: Best) -> Start {
         let entry = RayBoxes::new(ray).entry(self.bounds, best.t);
         let mut start = Start {
@@ -421,18 +422,20 @@ impl<'t, L: Ledger + ?Sized, const ANY: bool> Party<'_, 't, '_, L, ANY> {
 impl<'t, L: Ledger + ?Sized, const ANY: bool> Walker<'t> for Party<'_, 't, '_, L, ANY> {
     #[inline(always)]
     fn start(&self, ray: usize) -> Start {
-        let best = self.best(&self.ledger.hit(ray), self.way.instance);
-        let ray = &self.rays[ray];
-        if let Some(door) = &self.door {
-            return door.start(ray, best);
-        }
         Start {
-            ray: *ray,
+            ray: self.rays[ray],
             instance: self.way.instance,
             entry: self.way.entry,
             part: 0.0,
-            best,
+            best: self.best(&self.ledger.hit(ray), self.way.instance),
         }
+    }
+
+    #[inline(always)]
+    fn start_inside(&self, ray: usize) -> Option<Start> {
+        let door = self.door.as_ref()?;
+        let best = self.best(&self.ledger.hit(ray), self.way.instance);
+        Some(door.start(&self.rays[ray], best))
     }
 
     #[inline(always)]

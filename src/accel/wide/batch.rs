@@ -170,9 +170,8 @@ impl Stacks {
                 return;
             }
             found::<W, ANY, LATER>(walker, ray);
-            let start = walker.start(ray.ray as usize);
             // SAFETY: the caller has what `L` needs.
-            unsafe { enter::<L, LATER>(ray, tree, &start) };
+            unsafe { start::<L, W, LATER>(walker, ray.ray as usize, ray, tree) };
             // SAFETY: as for `step`.
             (ray.top, ray.current) = unsafe { self.next::<L, ANY>(ray) };
             return;
@@ -287,7 +286,28 @@ unsafe fn begin<'t, L: Lanes, W: Walker<'t>, const LATER: bool>(
 ) {
     ray.begin(index as u32, bottom);
     // SAFETY: the caller's word.
-    unsafe { enter::<L, LATER>(ray, tree, &walker.start(index)) };
+    unsafe { start::<L, W, LATER>(walker, index, ray, tree) };
+}
+
+/// Puts a ray at the root of the tree in which all begin.
+///
+/// # Safety
+/// The processor has the instructions of `L`.
+#[inline(always)]
+unsafe fn start<'t, L: Lanes, W: Walker<'t>, const LATER: bool>(
+    walker: &W,
+    index: usize,
+    ray: &mut State,
+    tree: &Tree,
+) {
+    // Two ways to the same: a start that may come from either would be put together in memory, for which every ray waits.
+    // SAFETY: the caller's word.
+    unsafe {
+        match walker.start_inside(index) {
+            Some(start) => enter::<L, LATER>(ray, tree, &start),
+            None => enter::<L, LATER>(ray, tree, &walker.start(index)),
+        }
+    }
 }
 
 /// Puts a ray at a tree's root, and aims it.
@@ -356,7 +376,7 @@ pub(super) unsafe fn batch<
         let rest_lists = lists.rest.as_mut_ptr();
         let (mut rest, mut later_rest) = (rest_lists.cast::<u32>(), rest_lists.add(1).cast());
         let inside = lists.inside.as_mut_ptr();
-        let ended = lists.ended.as_mut_ptr();
+        let ended_list = lists.ended.as_mut_ptr();
         let currents = lists.currents.as_mut_ptr();
         while node_count + leaf_count + rest_count > 0 {
             node_steps += node_count as u64;
@@ -405,14 +425,17 @@ pub(super) unsafe fn batch<
             L::file(leaves, currents, leaf_count, &mut ends);
             rest_count = ends.rest.offset_from(rest) as usize;
             // Those that have ended are taken apart: what comes next in a list of both nobody can foretell.
-            let (mut ended_count, mut others) = (0, 0);
-            for i in 0..rest_count {
-                let slot = *rest.add(i);
-                let has_ended = (*states.add(slot as usize)).current == DONE;
-                *ended.add(ended_count) = slot;
-                *rest.add(others) = slot;
-                ended_count += usize::from(has_ended);
-                others += usize::from(!has_ended);
+            let (mut ended, mut ended_count, mut others) = (rest, rest_count, 0);
+            if flight.others {
+                (ended, ended_count) = (ended_list, 0);
+                for i in 0..rest_count {
+                    let slot = *rest.add(i);
+                    let has_ended = (*states.add(slot as usize)).current == DONE;
+                    *ended.add(ended_count) = slot;
+                    *rest.add(others) = slot;
+                    ended_count += usize::from(has_ended);
+                    others += usize::from(!has_ended);
+                }
             }
             if FETCH {
                 for i in 0..others {

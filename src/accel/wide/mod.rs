@@ -49,6 +49,8 @@ pub(super) use state::{Best, Place, Start, Visit};
 pub(super) trait Walker<'t> {
     /// The ray with this index, and the best that is known of it.
     fn start(&self, ray: usize) -> Start;
+    /// The same in the space of the tree, where that is an instance's.
+    fn start_inside(&self, ray: usize) -> Option<Start>;
     /// Asks for the memory ahead of an item that is no triangle, which will be met; of the tree of that instance, or of
     /// the one in which the walk began.
     fn fetch(&self, instance: u32, item: u32);
@@ -113,6 +115,8 @@ pub(super) struct Needs {
     pub(super) fetch: bool,
     /// Whether any tree moves.
     pub(super) later: bool,
+    /// Whether any tree has items that are no triangles.
+    pub(super) others: bool,
 }
 
 impl Default for Tree {
@@ -192,7 +196,7 @@ impl Tree {
         counts: &mut Counts,
     ) {
         let levels = self.levels + 1 + needs.inner_levels;
-        let flight = &mut Flight::new(count.min(batch::IN_FLIGHT), levels);
+        let flight = &mut Flight::new(count.min(batch::IN_FLIGHT), levels, needs.others);
         if needs.later {
             compiled::batch::<W, ANY, true, true>(kernel, self, walker, count, flight, counts);
         } else if needs.fetch {

@@ -300,11 +300,13 @@ pub(in crate::accel) struct Flight {
     pub(super) stacks: Vec<Entry>,
     stride: usize,
     levels: usize,
+    /// Whether rays may come to items that are no triangles.
+    pub(super) others: bool,
 }
 
 impl Flight {
     /// Room for `rays` in trees of at most so many levels.
-    pub(in crate::accel) fn new(rays: usize, levels: usize) -> Self {
+    pub(in crate::accel) fn new(rays: usize, levels: usize, others: bool) -> Self {
         // Each level leaves up to seven children on the stack; the eighth is on its way down. A kernel
         // writes eight at once. An odd multiple of a cache line keeps stacks off each other's lines.
         let stride = (SENTINELS + (WIDTH - 1) * levels + 2 * WIDTH).div_ceil(8);
@@ -314,6 +316,7 @@ impl Flight {
             stacks: vec![BOTTOM; rays * stride],
             stride,
             levels,
+            others,
         }
     }
 
