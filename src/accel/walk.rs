@@ -277,26 +277,17 @@ impl<'t> Door<'t> {
         })
     }
 
-    /// As the walk through the world's tree would come to it.
-    #[inline(never)]
-    fn start(&self, ray: &Ray, best: Best) -> Start {
-        let entry = RayBoxes::new(ray).entry(self.bounds, best.t);
-        let mut start = Start {
-            ray: *ray,
+    /// As the walk through the world's tree would come to it; `None` where it would pass by.
+    #[inline(always)]
+    fn start(&self, ray: &Ray, best: Best) -> Option<Start> {
+        let entry = RayBoxes::new(ray).entry(self.bounds, best.t)?;
+        is_sound(ray).then(|| Start {
+            ray: to_local(&self.instance.to_world, ray),
             instance: self.way.instance,
-            entry: 0.0,
-            part: 0.0,
+            entry,
+            part: self.group.tree_at(ray.time).1,
             best,
-        };
-        match entry.filter(|_| is_sound(ray)) {
-            Some(entry) => {
-                start.ray = to_local(&self.instance.to_world, ray);
-                start.entry = entry;
-                (_, start.part) = self.group.tree_at(ray.time);
-            }
-            None => start.best.t = f32::NEG_INFINITY,
-        }
-        start
+        })
     }
 }
 
@@ -432,10 +423,14 @@ impl<'t, L: Ledger + ?Sized, const ANY: bool> Walker<'t> for Party<'_, 't, '_, L
     }
 
     #[inline(always)]
+    fn begins_inside(&self) -> bool {
+        self.door.is_some()
+    }
+
+    #[inline(always)]
     fn start_inside(&self, ray: usize) -> Option<Start> {
-        let door = self.door.as_ref()?;
         let best = self.best(&self.ledger.hit(ray), self.way.instance);
-        Some(door.start(&self.rays[ray], best))
+        self.door.as_ref()?.start(&self.rays[ray], best)
     }
 
     #[inline(always)]

@@ -249,7 +249,7 @@ mod tests {
             let drawn = Drawn::new(scene.tracer(), &projection, 0.0, |_| true).unwrap();
             let pattern = Pattern::of(4).unwrap();
             let canvas = Canvas {
-                pattern: pattern.clone(),
+                pattern,
                 ..Canvas::whole([80, 60])
             };
             let seen = Visibility::draw(&drawn, &projection, &canvas).unwrap();

@@ -171,7 +171,7 @@ impl Stacks {
             }
             found::<W, ANY, LATER>(walker, ray);
             // SAFETY: the caller has what `L` needs.
-            unsafe { start::<L, W, LATER>(walker, ray.ray as usize, ray, tree) };
+            unsafe { enter::<L, LATER>(ray, tree, &walker.start(ray.ray as usize)) };
             // SAFETY: as for `step`.
             (ray.top, ray.current) = unsafe { self.next::<L, ANY>(ray) };
             return;
@@ -272,42 +272,40 @@ fn found<'t, W: Walker<'t>, const ANY: bool, const LATER: bool>(walker: &mut W, 
     walker.found(ray.ray as usize, ray.instance, best, uv);
 }
 
-/// Begins with a ray at the tree's root; `bottom` is its stack's.
+/// Puts the next ray that has somewhere to go at the root of the tree in which all begin; whether there is one.
 ///
 /// # Safety
 /// The processor has the instructions of `L`.
 #[inline(always)]
 unsafe fn begin<'t, L: Lanes, W: Walker<'t>, const LATER: bool>(
     walker: &W,
-    index: usize,
-    ray: &mut State,
-    tree: &'t Tree,
-    bottom: u32,
-) {
-    ray.begin(index as u32, bottom);
-    // SAFETY: the caller's word.
-    unsafe { start::<L, W, LATER>(walker, index, ray, tree) };
-}
-
-/// Puts a ray at the root of the tree in which all begin.
-///
-/// # Safety
-/// The processor has the instructions of `L`.
-#[inline(always)]
-unsafe fn start<'t, L: Lanes, W: Walker<'t>, const LATER: bool>(
-    walker: &W,
-    index: usize,
+    (next, count): (&mut usize, usize),
     ray: &mut State,
     tree: &Tree,
-) {
-    // Two ways to the same: a start that may come from either would be put together in memory, for which every ray waits.
-    // SAFETY: the caller's word.
-    unsafe {
-        match walker.start_inside(index) {
-            Some(start) => enter::<L, LATER>(ray, tree, &start),
-            None => enter::<L, LATER>(ray, tree, &walker.start(index)),
+    bottom: u32,
+) -> bool {
+    // Two ways to the same: a start that may come from either would be put together in memory, and every ray would wait for it.
+    if walker.begins_inside() {
+        while *next < count {
+            let start = walker.start_inside(*next);
+            *next += 1;
+            if let Some(start) = start {
+                ray.begin((*next - 1) as u32, bottom);
+                // SAFETY: the caller's word.
+                unsafe { enter::<L, LATER>(ray, tree, &start) };
+                return true;
+            }
         }
+        return false;
     }
+    if *next == count {
+        return false;
+    }
+    ray.begin(*next as u32, bottom);
+    // SAFETY: the caller's word.
+    unsafe { enter::<L, LATER>(ray, tree, &walker.start(*next)) };
+    *next += 1;
+    true
 }
 
 /// Puts a ray at a tree's root, and aims it.
@@ -359,12 +357,15 @@ pub(super) unsafe fn batch<
     };
     let bottoms: [u32; IN_FLIGHT] = std::array::from_fn(|slot| flight.bottom(slot));
     let states = flight.states.as_mut_ptr();
+    let (mut next, mut node_count, mut leaf_count, mut rest_count) = (0, 0, 0, 0);
     for (slot, state) in flight.states.iter_mut().enumerate().take(slots) {
+        let rays = (&mut next, count);
         // SAFETY: the caller has what `L` needs.
-        unsafe { begin::<L, W, LATER>(walker, slot, state, tree, bottoms[slot]) };
-        lists.nodes[0][slot] = slot as u32;
+        if unsafe { begin::<L, W, LATER>(walker, rays, state, tree, bottoms[slot]) } {
+            lists.nodes[0][slot] = slot as u32;
+            node_count += 1;
+        }
     }
-    let (mut next, mut node_count, mut leaf_count, mut rest_count) = (slots, slots, 0, 0);
     let (mut node_steps, mut triangle_tests) = (0, 0);
     // SAFETY: every slot is on one list at a time, so none outgrows its array; rays at a node, a block or
     // an item are at one of this tree; stacks have room for its levels.
@@ -461,14 +462,12 @@ pub(super) unsafe fn batch<
                 let slot = *ended.add(i);
                 let ray = &mut *states.add(slot as usize);
                 found::<W, ANY, LATER>(walker, ray);
-                if next == count {
-                    continue;
+                let rays = (&mut next, count);
+                if begin::<L, W, LATER>(walker, rays, ray, tree, bottoms[slot as usize]) {
+                    *rest.add(ready) = slot;
+                    *currents.add(ready) = ray.current;
+                    ready += 1;
                 }
-                begin::<L, W, LATER>(walker, next, ray, tree, bottoms[slot as usize]);
-                next += 1;
-                *rest.add(ready) = slot;
-                *currents.add(ready) = ray.current;
-                ready += 1;
             }
             // Written behind the others, which have been read.
             let mut again = Ends {

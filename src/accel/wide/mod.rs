@@ -49,7 +49,9 @@ pub(super) use state::{Best, Place, Start, Visit};
 pub(super) trait Walker<'t> {
     /// The ray with this index, and the best that is known of it.
     fn start(&self, ray: usize) -> Start;
-    /// The same in the space of the tree, where that is an instance's.
+    /// Whether the walk begins in the tree of an instance.
+    fn begins_inside(&self) -> bool;
+    /// There, the same in the instance's space; `None` where the ray passes the instance by.
     fn start_inside(&self, ray: usize) -> Option<Start>;
     /// Asks for the memory ahead of an item that is no triangle, which will be met; of the tree of that instance, or of
     /// the one in which the walk began.
