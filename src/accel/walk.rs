@@ -91,7 +91,7 @@ impl<'t> Walk<'t> {
         let needs = Needs {
             inner_levels: tracer.inner_levels,
             fetch: tracer.is_large,
-            later: tracer.deforms,
+            later: tracer.deforms || party.door.is_some(),
             others: tracer.has_others,
         };
         tree.batch::<_, ANY>(kernel, needs, &mut party, count, &mut counts);

@@ -284,8 +284,9 @@ unsafe fn begin<'t, L: Lanes, W: Walker<'t>, const LATER: bool>(
     tree: &Tree,
     bottom: u32,
 ) -> bool {
-    // Two ways to the same: a start that may come from either would be put together in memory, and every ray would wait for it.
-    if walker.begins_inside() {
+    // Where nothing moves no word of it may be compiled: a start that may come from either would be put together in memory, and
+    // every ray would wait for it.
+    if LATER && walker.begins_inside() {
         while *next < count {
             let start = walker.start_inside(*next);
             *next += 1;

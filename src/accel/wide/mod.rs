@@ -49,7 +49,7 @@ pub(super) use state::{Best, Place, Start, Visit};
 pub(super) trait Walker<'t> {
     /// The ray with this index, and the best that is known of it.
     fn start(&self, ray: usize) -> Start;
-    /// Whether the walk begins in the tree of an instance.
+    /// Whether the walk begins in the tree of an instance, for which [`Needs::later`] must be set.
     fn begins_inside(&self) -> bool;
     /// There, the same in the instance's space; `None` where the ray passes the instance by.
     fn start_inside(&self, ray: usize) -> Option<Start>;
@@ -115,7 +115,7 @@ pub(super) struct Needs {
     pub(super) inner_levels: usize,
     /// Whether memory is asked for ahead.
     pub(super) fetch: bool,
-    /// Whether any tree moves.
+    /// Whether any tree moves, or the walk begins in an instance's.
     pub(super) later: bool,
     /// Whether any tree has items that are no triangles.
     pub(super) others: bool,
