@@ -87,6 +87,11 @@ impl Grid {
         self.block(block).grown(self.border, &self.film)
     }
 
+    /// How many sums a pixel has.
+    pub(crate) fn stride(&self) -> usize {
+        self.stride
+    }
+
     /// How many numbers a record has.
     fn record(&self) -> usize {
         let side = (BLOCK + 2 * self.border) as usize;

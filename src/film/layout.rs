@@ -71,17 +71,12 @@ impl Layout {
 
     /// Takes the values of a sample, a channel each, of a pass over the bands into what all passes come to. Of light and
     /// colours each pass brings a part, of other channels the first brings all.
-    pub(crate) fn take<'s>(
-        &self,
-        pass: u32,
-        values: &[f32],
-        sums: impl Iterator<Item = &'s mut f32>,
-    ) {
+    pub(crate) fn take(&self, pass: u32, values: &[f32], sums: &mut [f32]) {
         if pass == 0 {
-            sums.zip(values).for_each(|(sum, value)| *sum = *value);
+            sums[..values.len()].copy_from_slice(values);
             return;
         }
-        for (channel, (sum, value)) in sums.zip(values).enumerate() {
+        for (channel, (sum, value)) in sums.iter_mut().zip(values).enumerate() {
             if self.adds_up(channel) {
                 *sum += *value;
             }

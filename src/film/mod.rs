@@ -9,7 +9,7 @@ mod sums;
 
 pub(crate) use blocks::{BLOCK, Blocks, Grid, Record};
 pub(crate) use layout::Layout;
-pub(crate) use splat::{GROUP, Group};
+pub(crate) use splat::{GROUP, Group, row_length};
 pub(crate) use splats::Splats;
 pub(crate) use sums::{Accumulator, Rows, Summed, Sums, Tally, Times};
 

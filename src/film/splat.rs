@@ -1,18 +1,15 @@
-//! Samples to sums: a group of samples of one pixel at a time, in lanes.
+//! Samples to sums: a group of samples of one pixel at a time, whose channels are in lanes.
 //!
 //! Each sample counts in every pixel that its filter reaches, which at equal samples leaves a pixel 0.40× (tent) or 0.30×
 //! (gaussian) of the variance that counting each sample once would. Sums within a group are of single precision, beyond
 //! it of double.
 
 use crate::filter::{Filter, MAX_RADIUS};
-use crate::lanes::{Kernel, Lanes, MAX_LANES, Mask as _, Task};
+use crate::lanes::{Kernel, Lanes, MAX_LANES, Task, sum_by_halves};
 use crate::sensor::Window;
 
 /// The most samples of a group.
 pub(crate) const GROUP: usize = MAX_LANES;
-
-/// Columns of pixels that samples are added to at once: as many as common filters reach.
-const COLUMNS: usize = 5;
 
 /// The most pixels along an axis that a sample reaches.
 const MAX_REACH: usize = 2 * (MAX_RADIUS as usize + 1) + 1;
@@ -42,22 +39,32 @@ impl Group {
     }
 
     /// Adds the samples to the sums over `window`, `stride` for each pixel, row by row, of which the first are the weight and
-    /// the values. How many samples were left out, for they are not finite.
+    /// the values. How many samples were left out, for they are not finite: their rows become zeros.
     ///
-    /// A sample's values stand in a row a channel.
+    /// Each sample has a [row](row_length): 1, its values, and zeros.
     pub(crate) fn splat(
         &self,
         kernel: Kernel,
         filter: &Filter,
-        values: &[[f32; GROUP]],
+        rows: &mut [f32],
         window: &Window,
         stride: usize,
         sums: &mut [f64],
     ) -> u32 {
+        let length = rows.len() / self.count;
+        let mut refused = 0;
+        for row in rows.chunks_exact_mut(length) {
+            let finite = row.iter().fold(true, |all, value| all & value.is_finite());
+            if !finite {
+                row.fill(0.0);
+                refused += 1;
+            }
+        }
         let splat = Splat {
             group: self,
             filter,
-            values,
+            rows,
+            length,
             window,
             stride,
             sums,
@@ -66,14 +73,22 @@ impl Group {
             1 => splat.single(),
             _ => kernel.run(splat),
         }
+        refused
     }
+}
+
+/// How many numbers a sample's row has: 1, which becomes its weight, its values, and zeros up to whole lanes.
+pub(crate) fn row_length(values: usize) -> usize {
+    (1 + values).next_multiple_of(MAX_LANES)
 }
 
 /// The arguments of [`Group::splat`].
 struct Splat<'a> {
     group: &'a Group,
     filter: &'a Filter,
-    values: &'a [[f32; GROUP]],
+    rows: &'a [f32],
+    /// Of a row.
+    length: usize,
     window: &'a Window,
     stride: usize,
     sums: &'a mut [f64],
@@ -81,18 +96,16 @@ struct Splat<'a> {
 
 impl Splat<'_> {
     /// The same for a group of one sample, for which lanes would take as long as for a full one.
-    fn single(self) -> u32 {
+    fn single(self) {
         let Self {
             group,
             filter,
-            values,
+            rows,
             window,
             stride,
             sums,
+            ..
         } = self;
-        if !values.iter().all(|row| row[0].is_finite()) {
-            return 1;
-        }
         let [x, y] = group.pixel;
         let [right, below] = group.offsets.map(|row| row[0]);
         let reached = group.reached(filter, window);
@@ -110,109 +123,68 @@ impl Splat<'_> {
                 sums[(start + row * window.width as usize) * stride..].chunks_exact_mut(stride);
             for (pixel, column) in pixels.zip(&*columns) {
                 let weight = column * down;
-                let [sum, sums @ ..] = pixel else {
-                    return 0;
-                };
-                *sum += f64::from(weight);
-                for (sum, value) in sums.iter_mut().zip(values) {
-                    *sum += f64::from(value[0] * weight);
+                for (sum, value) in pixel.iter_mut().zip(rows) {
+                    *sum += f64::from(value * weight);
                 }
             }
         }
-        0
     }
-}
-
-/// A number for each sample: as many lanes as that takes.
-type Numbers<F> = [F; GROUP];
-
-/// How many of them are used.
-#[inline(always)]
-fn parts<F: Lanes>() -> usize {
-    GROUP / F::WIDTH
-}
-
-#[inline(always)]
-fn load<F: Lanes>(row: &[f32; GROUP]) -> Numbers<F> {
-    let mut numbers = [F::zero(); GROUP];
-    for part in 0..parts::<F>() {
-        numbers[part] = F::from_slice(&row[part * F::WIDTH..]);
-    }
-    numbers
 }
 
 impl Task for Splat<'_> {
-    type Output = u32;
+    type Output = ();
 
     #[inline(always)]
-    fn run<F: Lanes>(self) -> u32 {
+    fn run<F: Lanes>(self) {
         let Self {
             group,
             filter,
-            values,
+            rows,
+            length,
             window,
             stride,
             sums,
         } = self;
-        let (accepted, refused) = accepted::<F>(group.count, values);
         let [x, y] = group.pixel;
         let reached = group.reached(filter, window);
         let [first_x, first_y] = [distance(reached.x, x), distance(reached.y, y)];
-        for left in (0..reached.width).step_by(COLUMNS) {
-            let mut columns = [[0.0; GROUP]; COLUMNS];
-            let columns = &mut columns[..COLUMNS.min((reached.width - left) as usize)];
-            for (i, column) in (left..).zip(&mut *columns) {
-                let weight = weights::<F>(filter, &group.offsets[0], first_x + i as f32);
-                for part in 0..parts::<F>() {
-                    weight[part].store_to(&mut column[part * F::WIDTH..]);
-                }
+        let [mut across, mut down] = [[[0.0; GROUP]; MAX_REACH]; 2];
+        let across = &mut across[..reached.width as usize];
+        let down = &mut down[..reached.height as usize];
+        for (i, weight) in across.iter_mut().enumerate() {
+            *weight = weights::<F>(filter, &group.offsets[0], first_x + i as f32);
+            weight[group.count..].fill(0.0);
+        }
+        for (i, weight) in down.iter_mut().enumerate() {
+            *weight = weights::<F>(filter, &group.offsets[1], first_y + i as f32);
+        }
+        let start = (reached.y - window.y) as usize * window.width as usize;
+        let start = start + (reached.x - window.x) as usize;
+        for first in (0..stride.min(length)).step_by(F::WIDTH) {
+            let mut values = [F::zero(); GROUP];
+            for (value, row) in values.iter_mut().zip(rows.chunks_exact(length)) {
+                *value = F::from_slice(&row[first..]);
             }
-            let start = (reached.x - window.x + left) as usize;
-            for row in 0..reached.height {
-                let down = weights::<F>(filter, &group.offsets[1], first_y + row as f32);
-                let above = (reached.y - window.y + row) as usize * window.width as usize;
-                let pixels = sums[(above + start) * stride..].chunks_exact_mut(stride);
-                for (pixel, column) in pixels.zip(&*columns) {
-                    let mut weight = load::<F>(column);
-                    for part in 0..parts::<F>() {
-                        let product = weight[part] * down[part];
-                        weight[part] = F::select(accepted[part], product, F::zero());
-                    }
-                    let [sum, sums @ ..] = pixel else {
-                        return refused;
-                    };
-                    *sum += f64::from(F::sum(&weight));
-                    for (sum, value) in sums.iter_mut().zip(values) {
-                        let mut weighted = load::<F>(value);
-                        for part in 0..parts::<F>() {
-                            let product = weighted[part] * weight[part];
-                            weighted[part] = F::select(accepted[part], product, F::zero());
-                        }
-                        *sum += f64::from(F::sum(&weighted));
-                    }
+            let end = stride.min(first + F::WIDTH);
+            for (row, down) in down.iter().enumerate() {
+                let pixels = &mut sums[(start + row * window.width as usize) * stride..];
+                for (pixel, across) in pixels.chunks_exact_mut(stride).zip(&*across) {
+                    let weights = products::<F>(across, down);
+                    weighted(&values, &weights).add_to(&mut pixel[first..end]);
                 }
             }
         }
-        refused
     }
 }
 
-/// Which samples are finite; and how many are not.
+/// The sum of values by weights.
 #[inline(always)]
-fn accepted<F: Lanes>(count: usize, values: &[[f32; GROUP]]) -> ([F::Mask; GROUP], u32) {
-    let mut accepted = [F::Mask::splat(false); GROUP];
-    let mut refused = 0;
-    for part in 0..parts::<F>() {
-        let here = count.saturating_sub(part * F::WIDTH).min(F::WIDTH);
-        let there = F::Mask::from_bits(!(u32::MAX << here));
-        let mut finite = there;
-        for value in values {
-            finite = finite & F::from_slice(&value[part * F::WIDTH..]).is_finite();
-        }
-        accepted[part] = finite;
-        refused += (there & !finite).to_bits().count_ones();
+fn weighted<F: Lanes>(values: &[F; GROUP], weights: &[f32; GROUP]) -> F {
+    let mut terms = *values;
+    for (term, weight) in terms.iter_mut().zip(weights) {
+        *term = *term * F::splat(*weight);
     }
-    (accepted, refused)
+    sum_by_halves(terms)
 }
 
 /// From the near edge of the samples' own pixel to the middle of another: relative, so that it does not depend on where on
@@ -224,12 +196,25 @@ fn distance(to: u32, own: u32) -> f32 {
 
 /// The filter's weights along an axis, of samples for a place so far from their pixel's near edge.
 #[inline(always)]
-fn weights<F: Lanes>(filter: &Filter, offsets: &[f32; GROUP], place: f32) -> Numbers<F> {
-    let mut weights = load::<F>(offsets);
-    for weight in &mut weights[..parts::<F>()] {
-        *weight = filter.weight(F::splat(place) - *weight);
+fn weights<F: Lanes>(filter: &Filter, offsets: &[f32; GROUP], place: f32) -> [f32; GROUP] {
+    let mut weights = [0.0; GROUP];
+    for first in (0..GROUP).step_by(F::WIDTH) {
+        let offset = F::from_slice(&offsets[first..]);
+        let weight = filter.weight(F::splat(place) - offset);
+        weight.store_to(&mut weights[first..]);
     }
     weights
+}
+
+/// A number a sample times another.
+#[inline(always)]
+fn products<F: Lanes>(a: &[f32; GROUP], b: &[f32; GROUP]) -> [f32; GROUP] {
+    let mut products = [0.0; GROUP];
+    for first in (0..GROUP).step_by(F::WIDTH) {
+        let product = F::from_slice(&a[first..]) * F::from_slice(&b[first..]);
+        product.store_to(&mut products[first..]);
+    }
+    products
 }
 
 #[cfg(test)]
@@ -255,13 +240,17 @@ mod tests {
             let offsets: Vec<Vec2> = (0..count)
                 .map(|i| Vec2::new(number(1, i), number(2, i)))
                 .collect();
-            let mut values = [[f32::NAN; GROUP]; 5];
-            for (channel, row) in values.iter_mut().enumerate() {
-                for (i, value) in row.iter_mut().enumerate().take(count) {
-                    *value = number(3 + channel as u64, i);
+            let length = row_length(5);
+            let mut rows = vec![0.0; count * length];
+            for (i, row) in rows.chunks_exact_mut(length).enumerate() {
+                row[0] = 1.0;
+                for channel in 0..5 {
+                    row[1 + channel] = number(3 + channel as u64, i);
+                }
+                if i == 3 {
+                    row[3] = f32::INFINITY;
                 }
             }
-            values[2][3] = f32::INFINITY;
             let mut expected = vec![0.0; 9 * 8 * 6];
             for (i, offset) in offsets.iter().enumerate().filter(|(i, _)| *i != 3) {
                 for (index, sums) in expected.chunks_exact_mut(6).enumerate() {
@@ -269,9 +258,8 @@ mod tests {
                     let place = Vec2::new(pixel[0] as f32, pixel[1] as f32) + *offset;
                     let way = center - place;
                     let weight = filter.weight(way.x) * filter.weight(way.y);
-                    sums[0] += f64::from(weight);
-                    for (sum, row) in sums[1..].iter_mut().zip(&values) {
-                        *sum += f64::from(weight * row[i]);
+                    for (sum, value) in sums.iter_mut().zip(&rows[i * length..]) {
+                        *sum += f64::from(weight * value);
                     }
                 }
             }
@@ -286,7 +274,8 @@ mod tests {
             let mut first = None;
             for kernel in Kernel::all() {
                 let mut sums = vec![0.0; expected.len()];
-                let refused = group.splat(kernel, &filter, &values, &window, 6, &mut sums);
+                let given = &mut rows.clone();
+                let refused = group.splat(kernel, &filter, given, &window, 6, &mut sums);
                 assert_eq!(refused, u32::from(count > 3));
                 for (sum, expected) in sums.iter().zip(&expected) {
                     assert!((sum - expected).abs() < 1e-5, "{sum} {expected}");
@@ -294,15 +283,15 @@ mod tests {
                 let first = first.get_or_insert_with(|| sums.clone());
                 assert!(sums == *first, "{}", kernel.name());
                 let mut lanes = vec![0.0; expected.len()];
-                let splat = Splat {
+                kernel.run(Splat {
                     group: &group,
                     filter: &filter,
-                    values: &values,
+                    rows: given,
+                    length,
                     window: &window,
                     stride: 6,
                     sums: &mut lanes,
-                };
-                assert_eq!(kernel.run(splat), refused);
+                });
                 assert!(lanes == sums, "one sample by itself: {}", kernel.name());
             }
         }

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::splats::Shares;
-use super::{GROUP, Group, Layout, Splats};
+use super::{Group, Layout, Splats};
 use crate::color::{luminance, rgb_to_xyz};
 use crate::error::{Error, Problem, Result};
 use crate::filter::Filter;
@@ -218,17 +218,16 @@ impl Sums {
         &self.window
     }
 
-    /// Adds samples of a pixel, whose values stand in a row a channel, in all pixels of the window that their filter
-    /// reaches.
+    /// Adds samples of a pixel, of which each has a row, in all pixels of the window that their filter reaches.
     pub(crate) fn splat(
         &mut self,
         kernel: Kernel,
         filter: &Filter,
         group: &Group,
-        values: &[[f32; GROUP]],
+        rows: &mut [f32],
     ) {
         let stride = self.layout.stride();
-        let dropped = group.splat(kernel, filter, values, &self.window, stride, &mut self.data);
+        let dropped = group.splat(kernel, filter, rows, &self.window, stride, &mut self.data);
         self.tally.drop(group.pixel, dropped);
     }
 

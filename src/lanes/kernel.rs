@@ -2,6 +2,8 @@
 
 #![allow(unsafe_code)]
 
+use std::sync::OnceLock;
+
 use super::Task;
 #[cfg(target_arch = "x86_64")]
 use super::x86;
@@ -51,7 +53,8 @@ impl Kernel {
 
     /// The fastest on this processor.
     pub fn best() -> Self {
-        *Self::all().last().expect("there is a portable one")
+        static BEST: OnceLock<Kernel> = OnceLock::new();
+        *BEST.get_or_init(|| *Self::all().last().expect("there is a portable one"))
     }
 
     /// Which instructions it is; the processor has them.

@@ -42,6 +42,9 @@ pub const MAX_LANES: usize = 16;
 /// No table from which lanes gather has more entries.
 pub const MAX_TABLE: usize = 1 << 31;
 
+/// Tables of so many entries fit into registers.
+pub const SMALL_TABLE: usize = 96;
+
 /// Asks for a value's memory ahead, as far as it lies where the value begins.
 #[inline(always)]
 pub fn fetch<T>(value: &T) {
@@ -49,6 +52,19 @@ pub fn fetch<T>(value: &T) {
     x86::fetch(value);
     #[cfg(not(target_arch = "x86_64"))]
     let _ = value;
+}
+
+/// The sum of terms: those of the second half are added to those of the first, and so on.
+#[inline(always)]
+pub fn sum_by_halves<F: Lanes>(mut terms: [F; MAX_LANES]) -> F {
+    let mut half = MAX_LANES / 2;
+    while half > 0 {
+        for i in 0..half {
+            terms[i] = terms[i] + terms[i + half];
+        }
+        half /= 2;
+    }
+    terms[0]
 }
 
 /// The index of a table's last entry.
@@ -95,7 +111,7 @@ pub trait Lanes:
     /// How many lanes.
     const WIDTH: usize;
     /// A number for each lane: the way in and out.
-    type Row: Copy + Debug + Index<usize, Output = f32> + IndexMut<usize>;
+    type Row: Copy + Debug + Index<usize, Output = f32> + IndexMut<usize> + AsRef<[f32]>;
     /// Zeros.
     const ROW: Self::Row;
     /// As many integers.
@@ -124,14 +140,20 @@ pub trait Lanes:
     /// # Panics
     /// Where there are fewer than lanes.
     fn store_to(self, values: &mut [f32]);
-    /// The sum of [`MAX_LANES`] numbers, which stand in as many of the first of `parts` as that takes: those of the second
-    /// half are added to those of the first, and so on.
-    fn sum(parts: &[Self; MAX_LANES]) -> f32;
+    /// Adds the first numbers to those of a slice, which has no more than lanes.
+    fn add_to(self, sums: &mut [f64]);
+    /// Numbers of both in turns, `self`'s first: of the first half of lanes, and of the second.
+    fn interleave(self, other: Self) -> [Self; 2];
     /// The entries of a table; what is beyond its end is its last.
     ///
     /// # Panics
     /// Where the table is empty, or has more than [`MAX_TABLE`] entries.
     fn gather(table: &[f32], index: Self::Int) -> Self;
+    /// The same of a small table, by indices within it.
+    #[inline(always)]
+    fn gather_small(table: &[f32; SMALL_TABLE], index: Self::Int) -> Self {
+        Self::gather(table, index)
+    }
     /// One lane's number.
     fn lane(self, lane: usize) -> f32;
 
@@ -165,6 +187,19 @@ pub trait Lanes:
     /// In double precision.
     fn widen(self) -> Self::Double;
 
+    /// Exchanges rows and lanes of a square, whose rows are as many of the first as there are lanes.
+    #[inline(always)]
+    fn transpose(square: &mut [Self; MAX_LANES]) {
+        // Each round turns the bits of a number's place, row above lane, by one.
+        let (half, mut rounds) = (Self::WIDTH / 2, Self::WIDTH.ilog2());
+        while rounds > 0 {
+            let rows = *square;
+            for i in 0..half {
+                [square[2 * i], square[2 * i + 1]] = rows[i].interleave(rows[i + half]);
+            }
+            rounds -= 1;
+        }
+    }
     /// A row of its lanes.
     #[inline(always)]
     fn row(self) -> Self::Row {

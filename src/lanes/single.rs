@@ -2,7 +2,7 @@
 
 use std::num::Wrapping;
 
-use super::{Call, Doubles, Ints, Lanes, MAX_LANES, Mask, last_of};
+use super::{Call, Doubles, Ints, Lanes, Mask, last_of};
 
 impl Lanes for f32 {
     const WIDTH: usize = 1;
@@ -38,16 +38,12 @@ impl Lanes for f32 {
         values[0] = self;
     }
     #[inline(always)]
-    fn sum(parts: &[Self; MAX_LANES]) -> f32 {
-        let mut sums = *parts;
-        let mut half = MAX_LANES / 2;
-        while half > 0 {
-            for i in 0..half {
-                sums[i] += sums[i + half];
-            }
-            half /= 2;
-        }
-        sums[0]
+    fn add_to(self, sums: &mut [f64]) {
+        sums[0] += f64::from(self);
+    }
+    #[inline(always)]
+    fn interleave(self, other: Self) -> [Self; 2] {
+        [self, other]
     }
     #[inline(always)]
     fn gather(table: &[f32], index: Wrapping<u32>) -> Self {

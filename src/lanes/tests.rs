@@ -211,6 +211,54 @@ fn every_kernel_computes_the_same_bits() {
 }
 
 #[test]
+fn a_square_is_transposed() {
+    struct Square;
+    impl Task for Square {
+        type Output = Vec<Vec<f32>>;
+        #[inline(always)]
+        fn run<F: Lanes>(self) -> Vec<Vec<f32>> {
+            let mut square = [F::zero(); MAX_LANES];
+            for (i, row) in square.iter_mut().enumerate() {
+                *row = F::from_fn(|j| (100 * i + j) as f32);
+            }
+            F::transpose(&mut square);
+            let rows = square[..F::WIDTH].iter();
+            rows.map(|row| row.row().as_ref().to_vec()).collect()
+        }
+    }
+    for kernel in Kernel::all() {
+        let square = kernel.run(Square);
+        for (i, row) in square.iter().enumerate() {
+            for (j, number) in row.iter().enumerate() {
+                assert_eq!(*number, (100 * j + i) as f32, "{}", kernel.name());
+            }
+        }
+    }
+}
+
+#[test]
+fn small_tables_are_gathered_from_alike() {
+    struct Entries;
+    impl Task for Entries {
+        type Output = Vec<f32>;
+        #[inline(always)]
+        fn run<F: Lanes>(self) -> Vec<f32> {
+            let table = std::array::from_fn(|i| i as f32);
+            let mut entries = Vec::new();
+            for first in (0..SMALL_TABLE).step_by(F::WIDTH) {
+                let index = F::from_fn(|lane| (first + lane) as f32).to_int();
+                entries.extend_from_slice(F::gather_small(&table, index).row().as_ref());
+            }
+            entries
+        }
+    }
+    for kernel in Kernel::all() {
+        let expected: Vec<f32> = (0..SMALL_TABLE).map(|i| i as f32).collect();
+        assert_eq!(kernel.run(Entries), expected, "{}", kernel.name());
+    }
+}
+
+#[test]
 fn the_lanes_of_a_mask_are_those_that_say_yes() {
     struct Lanes5;
     impl Task for Lanes5 {

@@ -30,9 +30,7 @@ use super::samples::{self, Sink};
 use super::unit;
 use crate::color::{ColorModel, luminance};
 use crate::error::{Error, Result};
-use crate::film::{
-    Accumulator as _, Blocks, GROUP, Grid, Group, Layout, Record, Summed, Sums, Tally,
-};
+use crate::film::{Accumulator as _, Blocks, Grid, Group, Layout, Record, Summed, Sums, Tally};
 use crate::filter::Filter;
 use crate::image::Image;
 use crate::lanes::Kernel;
@@ -441,6 +439,7 @@ pub(super) fn pixels_of(window: Window) -> impl Iterator<Item = [u32; 2]> {
 pub(super) struct HalfBlock<'f> {
     pub(super) record: Record,
     reach: Window,
+    stride: usize,
     filter: &'f Filter,
     pub(super) tally: Tally,
 }
@@ -451,6 +450,7 @@ impl<'f> HalfBlock<'f> {
         Self {
             record: Record::new(grid, slot),
             reach: grid.reach(slot / 2),
+            stride: grid.stride(),
             filter: &job.view.film.filter,
             tally: Tally::default(),
         }
@@ -462,10 +462,9 @@ impl Sink for HalfBlock<'_> {
         &mut self.tally
     }
 
-    fn take(&mut self, kernel: Kernel, group: &Group, values: &[[f32; GROUP]]) {
+    fn take(&mut self, kernel: Kernel, group: &Group, rows: &mut [f32]) {
         let sums = self.record.sums_mut();
-        let stride = values.len() + 1;
-        let dropped = group.splat(kernel, self.filter, values, &self.reach, stride, sums);
+        let dropped = group.splat(kernel, self.filter, rows, &self.reach, self.stride, sums);
         self.tally.drop(group.pixel, dropped);
     }
 }
@@ -485,12 +484,11 @@ impl Sink for Spread<'_> {
         self.record.tally()
     }
 
-    fn take(&mut self, kernel: Kernel, group: &Group, values: &[[f32; GROUP]]) {
-        let [red, green, blue, ..] = values else {
-            return;
-        };
-        let colors = red.iter().zip(green).zip(blue).take(group.count);
-        for ((r, g), b) in colors {
+    fn take(&mut self, kernel: Kernel, group: &Group, rows: &mut [f32]) {
+        for row in rows.chunks_exact(rows.len() / group.count) {
+            let [_, r, g, b, ..] = row else {
+                return;
+            };
             if self.seen.is_multiple_of(self.set) {
                 self.sets.push(0.0);
             }
@@ -502,7 +500,7 @@ impl Sink for Spread<'_> {
                 *sum += f64::from(y);
             }
         }
-        self.record.take(kernel, group, values);
+        self.record.take(kernel, group, rows);
     }
 }
 

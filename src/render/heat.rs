@@ -13,7 +13,7 @@ use super::progress::{Phase, Progress, Silent};
 use super::samples::{self, Sink};
 use crate::color::ColorModel;
 use crate::error::{Error, Result};
-use crate::film::{GROUP, Group, Tally};
+use crate::film::{Group, Tally};
 use crate::integrator::Stats;
 use crate::lanes::Kernel;
 use crate::sampler::Stream;
@@ -41,7 +41,7 @@ impl Sink for Counted {
         &mut self.0
     }
 
-    fn take(&mut self, _: Kernel, _: &Group, _: &[[f32; GROUP]]) {}
+    fn take(&mut self, _: Kernel, _: &Group, _: &mut [f32]) {}
 }
 
 /// Traces the job's crop, whose pixels get samples by `fovea` if there is one.

@@ -287,7 +287,7 @@ impl<C: ColorModel> Picture<'_, C> {
                     if let Some(last) = values.last_mut() {
                         *last = alpha;
                     }
-                    self.layout.take(pass, &values, pixel.iter_mut());
+                    self.layout.take(pass, &values, &mut pixel);
                 }
                 rows.put([crop.x + parts[0].column, crop.y + y], &pixel);
             }

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use super::prepare::{Job, View};
 use super::progress::Progress;
 use crate::color::ColorModel;
-use crate::film::{GROUP, Group, Layout, Tally};
+use crate::film::{GROUP, Group, Layout, Tally, row_length};
 use crate::integrator::{Cost, Estimate, Estimates, Estimator as _, Start};
 use crate::lanes::{Kernel, Lanes, Task, Vec2};
 use crate::sampler::{Sampler, Stream, Streams};
@@ -38,7 +38,7 @@ pub(super) fn estimate<C: ColorModel, S: Sink>(
         groups: Vec::new(),
         estimates: Estimates::default(),
         row: Vec::new(),
-        columns: Vec::new(),
+        rows: Vec::new(),
         cost: Cost::default(),
         film: Duration::ZERO,
     };
@@ -76,10 +76,10 @@ struct Batch<'a, C: ColorModel> {
     /// Of the starts, in their order.
     groups: Vec<Group>,
     estimates: Estimates<C::Sample>,
-    /// A sample's values, a channel each.
+    /// What a pass brings to a sample, a channel each.
     row: Vec<f32>,
-    /// The groups' values, for each a row a channel.
-    columns: Vec<[f32; GROUP]>,
+    /// What all passes bring to the samples, a row each.
+    rows: Vec<f32>,
     cost: Cost,
     /// Time that colours and the film took.
     film: Duration,
@@ -90,8 +90,8 @@ impl<C: ColorModel> Batch<'_, C> {
         let before = self.cost.stats.rays();
         let (scene, integrator) = (self.job.scene, &self.job.view.integrator);
         let color = scene.color();
-        let count = self.layout.count();
-        self.columns.resize(self.groups.len() * count, [0.0; GROUP]);
+        let length = row_length(self.layout.count());
+        self.rows.resize(self.starts.len() * length, 0.0);
         for pass in 0..color.passes() {
             if pass > 0 {
                 for start in &mut self.starts {
@@ -108,8 +108,11 @@ impl<C: ColorModel> Batch<'_, C> {
             self.film += estimated.elapsed();
         }
         let estimated = Instant::now();
-        for (group, columns) in self.groups.iter().zip(self.columns.chunks_exact(count)) {
-            sink.take(scene.tracer().kernel(), group, columns);
+        let mut rest = self.rows.as_mut_slice();
+        for group in &self.groups {
+            let (rows, others) = rest.split_at_mut(group.count * length);
+            sink.take(scene.tracer().kernel(), group, rows);
+            rest = others;
         }
         self.film += estimated.elapsed();
         let rays = self.cost.stats.rays() - before;
@@ -118,17 +121,18 @@ impl<C: ColorModel> Batch<'_, C> {
         self.groups.clear();
     }
 
-    /// Adds what the estimates of a pass bring to the columns.
+    /// Adds what the estimates of a pass bring to the rows.
     fn develop(&mut self, pass: u32) {
         let (color, layout) = (self.job.scene.color(), &self.layout);
         let (count, extra) = (layout.count(), layout.extra());
         self.row.resize(count, 0.0);
-        let mut index = 0;
+        let rows = self.rows.chunks_exact_mut(row_length(count));
+        let mut samples = rows.zip(&self.estimates.values).enumerate();
         let weighted = !self.job.view.sensor.is_projective();
-        for (number, group) in self.groups.iter().enumerate() {
-            let columns = &mut self.columns[number * count..][..count];
-            for sample in 0..group.count {
-                let Estimate { radiance, alpha } = &self.estimates.values[index];
+        for group in &self.groups {
+            for (sample, (index, (row, estimate))) in samples.by_ref().take(group.count).enumerate()
+            {
+                let Estimate { radiance, alpha } = estimate;
                 let wavelengths = &self.starts[index].wavelengths;
                 let colors = &mut self.row[..extra.start];
                 color.develop(pass, radiance, wavelengths, colors);
@@ -139,9 +143,8 @@ impl<C: ColorModel> Batch<'_, C> {
                 let added = &self.estimates.extra[index * extra.len()..][..extra.len()];
                 self.row[extra.clone()].copy_from_slice(added);
                 self.row[extra.end] = *alpha;
-                let sums = columns.iter_mut().map(|column| &mut column[sample]);
-                layout.take(pass, &self.row, sums);
-                index += 1;
+                row[0] = 1.0;
+                layout.take(pass, &self.row, &mut row[1..]);
             }
         }
     }
@@ -203,8 +206,8 @@ pub(super) trait Sink {
     }
     /// What they cost.
     fn tally(&mut self) -> &mut Tally;
-    /// The next samples of a pixel, whose values stand in a row a channel.
-    fn take(&mut self, kernel: Kernel, group: &Group, values: &[[f32; GROUP]]);
+    /// The next samples of a pixel, each with a row, see [`Group::splat`].
+    fn take(&mut self, kernel: Kernel, group: &Group, rows: &mut [f32]);
 }
 
 /// The dimensions of a camera sample.
@@ -235,7 +238,8 @@ impl<C: ColorModel> Task for CameraSamples<'_, C> {
         let (width, height) = (F::splat(film.width as f32), F::splat(film.height as f32));
         let (open, close) = sensor.shutter();
         let (mut offsets, mut times) = ([[0.0; GROUP]; 2], [open; GROUP]);
-        let mut begun = self.streams.iter();
+        let (color, mut shifts) = (self.job.scene.color(), [0.0; GROUP]);
+        let mut begun = self.streams.iter().zip(0..);
         for first in (0..self.streams.len()).step_by(F::WIDTH) {
             let streams = Streams::<F>::of(&self.streams[first..]);
             let offset = self.sampler.pair(streams, PLACE);
@@ -255,14 +259,19 @@ impl<C: ColorModel> Task for CameraSamples<'_, C> {
                 let time = F::splat(open) + time * F::splat(close - open);
                 time.store_to(&mut times[first..]);
             }
+            if color.upsamples() {
+                let shift = self.sampler.number(streams, WAVELENGTH);
+                shift.store_to(&mut shifts[first..]);
+            }
             let end = self.streams.len().min(first + F::WIDTH);
             sensor.rays(place, lens, &times[first..end], |ray| {
-                let Some(stream) = begun.next() else { return };
-                let number = || stream.number(self.sampler, WAVELENGTH);
+                let Some((stream, number)) = begun.next() else {
+                    return;
+                };
                 self.starts.push(Start {
                     ray,
                     pass: 0,
-                    wavelengths: self.job.scene.color().wavelengths_of(0, number),
+                    wavelengths: color.wavelengths_of(0, || shifts[number]),
                     stream: *stream,
                 });
             });

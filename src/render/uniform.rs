@@ -10,7 +10,7 @@ use super::samples::{self, Sink};
 use super::unit;
 use crate::color::ColorModel;
 use crate::error::{Error, Result};
-use crate::film::{Accumulator as _, GROUP, Group, Summed, Sums, Tally};
+use crate::film::{Accumulator as _, Group, Summed, Sums, Tally};
 use crate::filter::Filter;
 use crate::lanes::Kernel;
 use crate::sampler::Stream;
@@ -76,8 +76,8 @@ pub(super) fn render_unit<C: ColorModel>(
                 self.0.tally.drop(pixel, 1);
             }
         }
-        fn take(&mut self, kernel: Kernel, group: &Group, values: &[[f32; GROUP]]) {
-            self.0.splat(kernel, self.1, group, values);
+        fn take(&mut self, kernel: Kernel, group: &Group, rows: &mut [f32]) {
+            self.0.splat(kernel, self.1, group, rows);
         }
     }
     let film = &job.view.film;

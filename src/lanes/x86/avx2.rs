@@ -9,8 +9,8 @@
 use std::arch::x86_64::*;
 use std::ops::{Neg, Not};
 
-use super::{operators, sum_of_eight};
-use crate::lanes::{Call, Doubles, Ints, Lanes, MAX_LANES, Mask, Task, last_of};
+use super::operators;
+use crate::lanes::{Call, Doubles, Ints, Lanes, Mask, Task, last_of};
 
 /// Does `task` over eight lanes.
 ///
@@ -141,9 +141,31 @@ impl Lanes for F32x8 {
         unsafe { _mm256_storeu_ps(values.as_mut_ptr(), self.0) }
     }
     #[inline(always)]
-    fn sum(parts: &[Self; MAX_LANES]) -> f32 {
+    fn add_to(self, sums: &mut [f64]) {
+        let (numbers, F64x8(first, second)) = (self.row(), self.widen());
+        for (i, (sums, four)) in sums.chunks_mut(4).zip([first, second]).enumerate() {
+            if sums.len() == 4 {
+                let sums = sums.as_mut_ptr();
+                // SAFETY: see the module; there are four.
+                unsafe { _mm256_storeu_pd(sums, _mm256_add_pd(_mm256_loadu_pd(sums), four)) };
+            } else {
+                for (sum, number) in sums.iter_mut().zip(&numbers[4 * i..]) {
+                    *sum += f64::from(*number);
+                }
+            }
+        }
+    }
+    #[inline(always)]
+    fn interleave(self, other: Self) -> [Self; 2] {
         // SAFETY: see the module.
-        unsafe { sum_of_eight(_mm256_add_ps(parts[0].0, parts[1].0)) }
+        unsafe {
+            let low = _mm256_unpacklo_ps(self.0, other.0);
+            let high = _mm256_unpackhi_ps(self.0, other.0);
+            [
+                Self(_mm256_permute2f128_ps::<0x20>(low, high)),
+                Self(_mm256_permute2f128_ps::<0x31>(low, high)),
+            ]
+        }
     }
     #[inline(always)]
     fn gather(table: &[f32], index: U32x8) -> Self {

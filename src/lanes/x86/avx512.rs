@@ -8,8 +8,8 @@
 use std::arch::x86_64::*;
 use std::ops::{BitAnd, BitOr, BitXor, Neg, Not};
 
-use super::{operators, sum_of_eight};
-use crate::lanes::{Call, Doubles, Ints, Lanes, MAX_LANES, Mask, Task, last_of};
+use super::operators;
+use crate::lanes::{Call, Doubles, Ints, Lanes, Mask, SMALL_TABLE, Task, last_of};
 
 /// Does `task` over sixteen lanes.
 ///
@@ -154,12 +154,28 @@ impl Lanes for F32x16 {
         unsafe { _mm512_storeu_ps(values.as_mut_ptr(), self.0) }
     }
     #[inline(always)]
-    fn sum(parts: &[Self; MAX_LANES]) -> f32 {
+    fn add_to(self, sums: &mut [f64]) {
+        let F64x16(first, second) = self.widen();
+        for (sums, numbers) in sums.chunks_mut(8).zip([first, second]) {
+            let there = u8::MAX >> (8 - sums.len());
+            let sums = sums.as_mut_ptr();
+            // SAFETY: see the module; what is not there is left alone.
+            unsafe {
+                let sum = _mm512_add_pd(_mm512_maskz_loadu_pd(there, sums), numbers);
+                _mm512_mask_storeu_pd(sums, there, sum);
+            }
+        }
+    }
+    #[inline(always)]
+    fn interleave(self, other: Self) -> [Self; 2] {
         // SAFETY: see the module.
         unsafe {
-            let all = parts[0].0;
-            let high = _mm512_extractf32x8_ps::<1>(all);
-            sum_of_eight(_mm256_add_ps(_mm512_castps512_ps256(all), high))
+            let first = _mm512_setr_epi32(0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23);
+            let second = _mm512_add_epi32(first, _mm512_set1_epi32(8));
+            [
+                Self(_mm512_permutex2var_ps(self.0, first, other.0)),
+                Self(_mm512_permutex2var_ps(self.0, second, other.0)),
+            ]
         }
     }
     #[inline(always)]
@@ -167,6 +183,21 @@ impl Lanes for F32x16 {
         let index = index.min(U32x16::splat(last_of(table)));
         // SAFETY: see the module; no index is beyond the table, or read as one below 0.
         unsafe { Self(_mm512_i32gather_ps::<4>(index.0, table.as_ptr())) }
+    }
+    #[inline(always)]
+    fn gather_small(table: &[f32; SMALL_TABLE], index: U32x16) -> Self {
+        let number = |first: usize| Self::from_slice(&table[first..]).0;
+        // SAFETY: see the module; the lowest five bits of an index count.
+        let [low, middle, high] = unsafe {
+            [
+                Self(_mm512_permutex2var_ps(number(0), index.0, number(16))),
+                Self(_mm512_permutex2var_ps(number(32), index.0, number(48))),
+                Self(_mm512_permutex2var_ps(number(64), index.0, number(80))),
+            ]
+        };
+        let is_low = index.lt(U32x16::splat(32));
+        let is_high = !index.lt(U32x16::splat(64));
+        Self::select(is_high, high, Self::select(is_low, low, middle))
     }
     #[inline(always)]
     fn lane(self, lane: usize) -> f32 {
