@@ -6,8 +6,8 @@
 
 use std::sync::{Arc, OnceLock};
 
-use super::cie;
-use super::comb::Comb;
+use super::cie::{self, Between};
+use super::comb::{Comb, Teeth};
 use super::d65::d65;
 use super::model::{Color, ColorModel, Role, xyz_to_rgb};
 use super::response::Response;
@@ -15,7 +15,7 @@ use super::samples::{Columns, Samples, Spectra as _, Spectral as _};
 use super::spectrum::{Spectrum, Upsampled};
 use super::texels::Pixels;
 use super::upsample::Table;
-use crate::lanes::{Call, Ints as _, Lanes, Vec2};
+use crate::lanes::{self, Call, Ints as _, Kernel, Lanes, MAX_LANES, SMALL_TABLE, Task, Vec2};
 
 /// Bands of which a path carries up to `N` in `N` lanes; lanes in excess carry nothing. More bands take several passes.
 #[derive(Clone, Debug)]
@@ -41,11 +41,6 @@ impl<const N: usize> Bands<N> {
     pub fn visible(count: usize) -> Option<Self> {
         Some(Self::new(Comb::new(count, super::VISIBLE)?, Arc::default()))
     }
-
-    /// The bands of a pass, in the order of lanes.
-    fn bands_of(&self, pass: u32) -> impl Iterator<Item = usize> {
-        (pass as usize..self.comb.count()).step_by(self.passes() as usize)
-    }
 }
 
 /// How bands are called in spectral images: S0 is intensity without regard to polarisation, then the middle of the band,
@@ -59,8 +54,7 @@ fn band_name(comb: &Comb, band: usize) -> String {
 impl<const N: usize> ColorModel for Bands<N> {
     type Stored = Spectrum;
     type Texels = Vec<Upsampled>;
-    /// nm; lanes that are not in use have the first band's.
-    type Wavelengths = [f32; N];
+    type Wavelengths = Teeth<f32>;
     type Sample = Samples<N>;
     type Columns<F: Lanes> = Columns<F, N>;
 
@@ -69,28 +63,21 @@ impl<const N: usize> ColorModel for Bands<N> {
     }
 
     #[inline]
-    fn wavelengths(&self, u: impl FnOnce() -> f32) -> [f32; N] {
-        let (u, count) = (u(), self.carried.count());
-        std::array::from_fn(|i| self.carried.wavelength(if i < count { i } else { 0 }, u))
+    fn wavelengths(&self, u: impl FnOnce() -> f32) -> Teeth<f32> {
+        self.carried.teeth(0, 1, u())
     }
 
     #[inline]
-    fn wavelengths_of(&self, pass: u32, u: impl FnOnce() -> f32) -> [f32; N] {
-        let u = u();
-        let mut wavelengths = [self.comb.wavelength(pass as usize, u); N];
-        for (wavelength, band) in wavelengths.iter_mut().zip(self.bands_of(pass)) {
-            *wavelength = self.comb.wavelength(band, u);
-        }
-        wavelengths
+    fn wavelengths_of(&self, pass: u32, u: impl FnOnce() -> f32) -> Teeth<f32> {
+        (self.comb).teeth(pass as usize, self.passes() as usize, u())
     }
 
     #[inline(always)]
-    fn narrowed(wavelengths: &[f32; N], throughput: &Samples<N>) -> [f32; N] {
-        let carrying = throughput.0.iter().filter(|v| **v != 0.0).count();
-        let only = throughput.0.iter().position(|v| *v != 0.0);
-        match only.filter(|_| carrying == 1) {
-            Some(only) => [wavelengths[only]; N],
-            None => *wavelengths,
+    fn narrowed(wavelengths: &Teeth<f32>, throughput: &Samples<N>) -> Teeth<f32> {
+        let mut carrying = (0..N).filter(|band| throughput.0[*band] != 0.0);
+        match (carrying.next(), carrying.next()) {
+            (Some(only), None) => wavelengths.only(only),
+            _ => *wavelengths,
         }
     }
 
@@ -107,21 +94,24 @@ impl<const N: usize> ColorModel for Bands<N> {
     }
 
     #[inline]
-    fn evaluate(stored: &Spectrum, wavelengths: &[f32; N]) -> Samples<N> {
-        Samples(stored.sample(wavelengths))
+    fn evaluate(stored: &Spectrum, wavelengths: &Teeth<f32>) -> Samples<N> {
+        Kernel::best().run(OverBands {
+            stored,
+            wavelengths,
+        })
     }
 
     #[inline(always)]
-    fn evaluate_lanes<F: Lanes>(stored: &Spectrum, wavelengths: &[[f32; N]]) -> Columns<F, N> {
+    fn evaluate_lanes<F: Lanes>(stored: &Spectrum, wavelengths: &[Teeth<f32>]) -> Columns<F, N> {
         F::call(Evaluation {
             stored,
             wavelengths,
         })
     }
 
-    fn evaluate_rgb(&self, rgb: [f32; 3], role: Role, wavelengths: &[f32; N]) -> Samples<N> {
+    fn evaluate_rgb(&self, rgb: [f32; 3], role: Role, wavelengths: &Teeth<f32>) -> Samples<N> {
         let texel = Upsampled::of_texel(Table::shared(), rgb, role);
-        Samples(texel.sample(wavelengths))
+        Samples(texel.sample(&wavelengths.all()))
     }
 
     fn texel_bytes(_pixels: &Pixels) -> usize {
@@ -138,12 +128,12 @@ impl<const N: usize> ColorModel for Bands<N> {
     fn evaluate_texels<F: Lanes>(
         texels: &Vec<Upsampled>,
         index: F::Int,
-        wavelengths: &[[f32; N]],
+        wavelengths: &[Teeth<f32>],
     ) -> Columns<F, N> {
         let mut row = F::Int::ROW;
         index.store(&mut row);
         Columns::from_samples(|lane| {
-            Samples::<N>(texel(texels, row[lane]).sample(&wavelengths[lane]))
+            Samples::<N>(texel(texels, row[lane]).sample(&wavelengths[lane].all()))
         })
     }
 
@@ -153,7 +143,7 @@ impl<const N: usize> ColorModel for Bands<N> {
         texels: &Vec<Upsampled>,
         corners: [[F::Int; 2]; 2],
         place: Vec2<F>,
-        wavelengths: &[[f32; N]],
+        wavelengths: &[Teeth<f32>],
     ) -> Columns<F, N> {
         let (across, down) = (place.x.row(), place.y.row());
         let mut rows = [[F::Int::ROW; 2]; 2];
@@ -164,6 +154,7 @@ impl<const N: usize> ColorModel for Bands<N> {
         }
         Columns::from_samples(|lane| {
             let (fx, fy) = (across[lane], down[lane]);
+            let wavelengths: [f32; N] = wavelengths[lane].all();
             let mut scale = 0.0;
             let mut shape = [0.0; N];
             for (row, wy) in rows.iter().zip([1.0 - fy, fy]) {
@@ -171,27 +162,23 @@ impl<const N: usize> ColorModel for Bands<N> {
                     let texel = texel(texels, corner[lane]);
                     let weight = wx * wy;
                     scale += weight * texel.scale;
-                    for (sum, l) in shape.iter_mut().zip(&wavelengths[lane]) {
+                    for (sum, l) in shape.iter_mut().zip(&wavelengths) {
                         *sum += weight * texel.sigmoid.eval(*l);
                     }
                 }
             }
             let light = texel(texels, rows[0][0][lane]).illuminant;
             Samples::<N>::from_fn(|i| {
-                let power = if light {
-                    d65(wavelengths[lane][i])
-                } else {
-                    1.0
-                };
+                let power = if light { d65(wavelengths[i]) } else { 1.0 };
                 scale * shape[i] * power
             })
         })
     }
 
-    fn luminance(&self, sample: &Samples<N>, wavelengths: &[f32; N]) -> f32 {
+    fn luminance(&self, sample: &Samples<N>, wavelengths: &Teeth<f32>) -> f32 {
         let (mut sum, mut white) = (0.0, 0.0);
         for i in 0..self.carried.count() {
-            let weight = cie::xyz(wavelengths[i])[1];
+            let weight = cie::xyz(wavelengths.at(i))[1];
             sum += weight * sample[i];
             white += weight;
         }
@@ -207,52 +194,110 @@ impl<const N: usize> ColorModel for Bands<N> {
         names
     }
 
-    fn develop(&self, pass: u32, sample: &Samples<N>, wavelengths: &[f32; N], out: &mut [f32]) {
-        let nodes = observer();
-        let mut rgb = [0.0; 3];
+    fn develop(&self, pass: u32, sample: &Samples<N>, wavelengths: &Teeth<f32>, out: &mut [f32]) {
         // The last pass may have a lane that is no band's.
-        let count = self.bands_of(pass).count();
-        let (values, wavelengths) = (&sample.0[..count], &wavelengths[..count]);
-        for (value, wavelength) in values.iter().zip(wavelengths) {
-            let Some((node, t)) = cie::locate(*wavelength) else {
-                continue;
-            };
-            let (a, b) = (value * (1.0 - t), value * t);
-            for c in 0..3 {
-                rgb[c] += a * nodes[node][c] + b * nodes[node + 1][c];
-            }
-        }
+        let (mut values, count) = (*sample, wavelengths.count());
+        values.0[count..].fill(0.0);
+        let rgb = Kernel::best().run(Seen {
+            values: &values.0,
+            wavelengths,
+        });
         for c in 0..3 {
             out[c] = rgb[c] * self.comb.width();
         }
         if self.responses.is_empty() {
-            out[3..3 + self.comb.count()].fill(0.0);
-            for (band, value) in self.bands_of(pass).zip(values) {
-                out[3 + band] = *value;
+            let (first, every) = (pass as usize, self.passes() as usize);
+            let bands = &mut out[3..3 + self.comb.count()];
+            bands.fill(0.0);
+            for (number, value) in values.0[..count].iter().enumerate() {
+                bands[first + number * every] = *value;
             }
         }
         for (out, response) in out[3..].iter_mut().zip(self.responses.iter()) {
-            *out = response.of(&self.comb, values, wavelengths);
+            *out = response.of(&self.comb, &values.0[..count], wavelengths);
         }
     }
 }
 
 /// The observer's curves as linear BT.709, at their nodes, in 1/nm.
-fn observer() -> &'static [[f32; 3]; cie::SAMPLES] {
-    static NODES: OnceLock<[[f32; 3]; cie::SAMPLES]> = OnceLock::new();
+fn observer() -> &'static [[f32; SMALL_TABLE]; 3] {
+    static NODES: OnceLock<[[f32; SMALL_TABLE]; 3]> = OnceLock::new();
     NODES.get_or_init(|| {
-        std::array::from_fn(|i| {
+        let mut nodes = [[0.0; SMALL_TABLE]; 3];
+        for i in 0..cie::SAMPLES {
             let xyz = [cie::X[i], cie::Y[i], cie::Z[i]];
             let scaled = xyz.map(|v| f64::from(v) * f64::from(cie::NORMALIZATION));
-            xyz_to_rgb(scaled).map(|v| v as f32)
-        })
+            for (nodes, value) in nodes.iter_mut().zip(xyz_to_rgb(scaled)) {
+                nodes[i] = value as f32;
+            }
+        }
+        nodes
     })
+}
+
+/// What the observer makes of values at wavelengths, which are in lanes: linear BT.709, a nanometre each.
+struct Seen<'a, const N: usize> {
+    values: &'a [f32; N],
+    wavelengths: &'a Teeth<f32>,
+}
+
+impl<const N: usize> Task for Seen<'_, N> {
+    type Output = [f32; 3];
+
+    #[inline(always)]
+    fn run<F: Lanes>(self) -> [f32; 3] {
+        let observer = observer();
+        let mut sums = [[0.0; MAX_LANES]; 3];
+        for part in (0..MAX_LANES).step_by(F::WIDTH) {
+            let mut sum = [F::zero(); 3];
+            for first in (part..N).step_by(MAX_LANES) {
+                let values = &self.values[first..];
+                let value = match values.len() < F::WIDTH {
+                    true => F::from_fn(|lane| values.get(lane).copied().unwrap_or(0.0)),
+                    false => F::from_slice(values),
+                };
+                let place = Between::of(self.wavelengths.from::<F>(first));
+                for (sum, curve) in sum.iter_mut().zip(observer) {
+                    *sum = *sum + value * place.look_up(curve);
+                }
+            }
+            for (sums, sum) in sums.iter_mut().zip(sum) {
+                sum.store_to(&mut sums[part..]);
+            }
+        }
+        [
+            lanes::sum_by_halves(sums[0]),
+            lanes::sum_by_halves(sums[1]),
+            lanes::sum_by_halves(sums[2]),
+        ]
+    }
+}
+
+/// The arguments of [`ColorModel::evaluate`], whose bands are in lanes.
+struct OverBands<'a, const N: usize> {
+    stored: &'a Spectrum,
+    wavelengths: &'a Teeth<f32>,
+}
+
+impl<const N: usize> Task for OverBands<'_, N> {
+    type Output = Samples<N>;
+
+    #[inline(always)]
+    fn run<F: Lanes>(self) -> Samples<N> {
+        let mut values = [0.0; N];
+        for (number, values) in values.chunks_mut(F::WIDTH).enumerate() {
+            let wavelengths = self.wavelengths.from(number * F::WIDTH);
+            let row = self.stored.at_lanes::<F>(wavelengths).row();
+            values.copy_from_slice(&row.as_ref()[..values.len()]);
+        }
+        Samples(values)
+    }
 }
 
 /// The arguments of [`ColorModel::evaluate_lanes`].
 struct Evaluation<'a, const N: usize> {
     stored: &'a Spectrum,
-    wavelengths: &'a [[f32; N]],
+    wavelengths: &'a [Teeth<f32>],
 }
 
 impl<F: Lanes, const N: usize> Call<F> for Evaluation<'_, N> {
@@ -268,11 +313,14 @@ impl<F: Lanes, const N: usize> Call<F> for Evaluation<'_, N> {
             return Columns([F::splat(*value); N]);
         }
         if let Spectrum::Curve(_) = stored {
-            return Columns::from_samples(|lane| Samples(stored.sample(&wavelengths[lane])));
+            return Columns::from_samples(|lane| {
+                Samples(stored.sample(&wavelengths[lane].all::<N>()))
+            });
         }
-        let mut values: Columns<F, N> = Columns::from_samples(|lane| Samples(wavelengths[lane]));
-        for value in &mut values.0 {
-            *value = stored.at_lanes(*value);
+        let wavelengths = Teeth::<F>::of(wavelengths);
+        let mut values = Columns([F::zero(); N]);
+        for (number, value) in values.0.iter_mut().enumerate() {
+            *value = stored.at_lanes(wavelengths.at(number));
         }
         values
     }
@@ -338,24 +386,67 @@ mod tests {
         }
     }
 
+    /// The bits of a spectrum at the wavelengths of some of a comb's paths, and of what an observer makes of it, by each
+    /// kernel.
+    fn bits_of<const N: usize>(count: usize, color: &Color) -> Vec<Vec<u32>> {
+        let bands = Bands::<N>::visible(count).unwrap();
+        let stored = bands.store(color, Role::Emission).unwrap();
+        let bits = |kernel: Kernel| {
+            let shifts = (0..40).map(|i| i as f32 / 40.0);
+            let paths = shifts.flat_map(|u| {
+                let wavelengths = &bands.wavelengths(|| u);
+                let stored = &stored;
+                let values = kernel.run(OverBands::<N> {
+                    stored,
+                    wavelengths,
+                });
+                let rgb = kernel.run(Seen {
+                    values: &values.0,
+                    wavelengths,
+                });
+                values.0.into_iter().chain(rgb)
+            });
+            paths.map(f32::to_bits).collect()
+        };
+        Kernel::all().into_iter().map(bits).collect()
+    }
+
+    #[test]
+    fn every_kernel_sees_the_same_bits() {
+        let even = (0..40).map(|i| (400.0 + 7.0 * f64::from(i), f64::from(i * i % 7)));
+        for color in [
+            Color::Rgb([0.2, 0.5, 3.0]),
+            Color::Flat(0.7),
+            Color::Curve(even.collect()),
+            Color::Curve(vec![(450.0, 1.0), (500.0, 2.0), (700.0, 0.5)]),
+        ] {
+            for bits in [
+                bits_of::<8>(5, &color),
+                bits_of::<16>(16, &color),
+                bits_of::<32>(29, &color),
+            ] {
+                assert!(
+                    bits.iter().all(|of_kernel| *of_kernel == bits[0]),
+                    "{color:?}"
+                );
+            }
+        }
+    }
+
     #[test]
     fn each_band_is_in_one_pass() {
         for count in [1, 7, 8, 9, 17, 100] {
             let bands = Bands::<8>::visible(count).unwrap();
-            let mut all: Vec<usize> = (0..bands.passes())
-                .flat_map(|p| bands.bands_of(p))
-                .collect();
-            all.sort_unstable();
-            assert!(all.into_iter().eq(0..count), "{count}");
+            let mut all = Vec::new();
             for pass in 0..bands.passes() {
                 let wavelengths = bands.wavelengths_of(pass, || 0.5);
-                for (lane, band) in bands.bands_of(pass).enumerate() {
-                    assert_eq!(
-                        wavelengths[lane],
-                        bands.comb.wavelength(band, 0.5),
-                        "{count}"
-                    );
-                }
+                all.extend((0..wavelengths.count()).map(|i| wavelengths.at(i)));
+            }
+            all.sort_unstable_by(f32::total_cmp);
+            assert_eq!(all.len(), count);
+            for (band, wavelength) in all.into_iter().enumerate() {
+                let error = wavelength - bands.comb.wavelength(band, 0.5);
+                assert!(error.abs() < 1e-3, "{count}: {wavelength} nm");
             }
         }
     }

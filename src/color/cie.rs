@@ -2,6 +2,8 @@
 //! every 5 nm from 360 to 830 nm (CIE 15:2004, tables T.4 and T.6), linear in between. A spectrum L has the
 //! tristimulus values X = [`NORMALIZATION`] · ∫ L(λ) x̄(λ) dλ, and likewise Y and Z.
 
+use crate::lanes::{Ints as _, Lanes, SMALL_TABLE};
+
 /// The first tabulated wavelength, in nm.
 pub const FIRST: f32 = 360.0;
 /// The last tabulated wavelength, in nm.
@@ -24,6 +26,39 @@ pub(super) fn locate(lambda: f32) -> Option<(usize, f32)> {
     let position = (lambda - FIRST) / STEP;
     let node = (position as usize).min(SAMPLES - 2);
     Some((node, position - node as f32))
+}
+
+/// Where wavelengths in lanes are among the tabulated ones.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Between<F: Lanes> {
+    /// The tabulated wavelength below.
+    node: F::Int,
+    /// The fraction of the step to the next one.
+    t: F,
+    inside: F::Mask,
+}
+
+impl<F: Lanes> Between<F> {
+    /// Of wavelengths in nm.
+    #[inline(always)]
+    pub(super) fn of(lambda: F) -> Self {
+        let place = (lambda - F::splat(FIRST)) * F::splat(1.0 / STEP);
+        let node = place.clamp(0.0, (SAMPLES - 2) as f32).to_int();
+        Self {
+            node,
+            t: place - node.to_float(),
+            inside: F::splat(FIRST).le(lambda) & lambda.le(F::splat(LAST)),
+        }
+    }
+
+    /// What a table of [`SAMPLES`] numbers gives there, 0 outside; the last of its places is not looked at.
+    #[inline(always)]
+    pub(super) fn look_up(&self, table: &[f32; SMALL_TABLE]) -> F {
+        let a = F::gather_small(table, self.node);
+        let b = F::gather_small(table, self.node + F::Int::splat(1));
+        let value = (F::one() - self.t) * a + self.t * b;
+        F::select(self.inside, value, F::zero())
+    }
 }
 
 /// x̄, ȳ and z̄ at `lambda` (nm), 0 outside [[`FIRST`], [`LAST`]].

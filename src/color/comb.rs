@@ -2,6 +2,7 @@
 //! their bands by one number.
 
 use super::cie;
+use crate::lanes::Lanes;
 
 /// Equal bands side by side.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,10 +48,80 @@ impl Comb {
         self.first + (band as f32 + u) * self.width()
     }
 
+    /// The wavelengths at the fraction `u` of bands: of `first` and every `every`-th behind it.
+    #[inline]
+    pub(super) fn teeth(&self, first: usize, every: usize, u: f32) -> Teeth<f32> {
+        Teeth {
+            first: self.wavelength(first, u),
+            step: every as f32 * self.width(),
+            count: (self.count - first).div_ceil(every),
+        }
+    }
+
     /// The middle of a band in nm.
     pub fn centre(&self, band: usize) -> f64 {
         let (first, last) = (f64::from(self.first), f64::from(self.last));
         first + (last - first) * (band as f64 + 0.5) / self.count as f64
+    }
+}
+
+/// Wavelengths at even steps, as a path carries them, one a band; those of paths in lanes if `F` is that.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Teeth<F> {
+    /// In nm.
+    first: F,
+    step: F,
+    /// How many there are.
+    count: usize,
+}
+
+impl<F: Lanes> Teeth<F> {
+    /// Those of the paths of one wave, from the first lane on.
+    #[inline(always)]
+    pub(super) fn of(paths: &[Teeth<f32>]) -> Self {
+        Self {
+            first: F::from_fn(|lane| paths[lane].first),
+            step: F::from_fn(|lane| paths[lane].step),
+            count: paths[0].count,
+        }
+    }
+
+    /// A wavelength in nm; beyond the last, the first.
+    #[inline(always)]
+    pub(super) fn at(&self, number: usize) -> F {
+        let number = if number < self.count { number } else { 0 };
+        self.first + self.step * F::splat(number as f32)
+    }
+}
+
+impl Teeth<f32> {
+    /// Each of the first `N`.
+    #[inline(always)]
+    pub(super) fn all<const N: usize>(&self) -> [f32; N] {
+        std::array::from_fn(|number| self.at(number))
+    }
+
+    /// In lanes, one after another from one on.
+    #[inline(always)]
+    pub(super) fn from<F: Lanes>(&self, number: usize) -> F {
+        let numbers = F::from_fn(|lane| (number + lane) as f32);
+        let there = numbers.lt(F::splat(self.count as f32));
+        F::splat(self.first) + F::splat(self.step) * F::select(there, numbers, F::zero())
+    }
+
+    /// How many there are.
+    pub(super) fn count(&self) -> usize {
+        self.count
+    }
+
+    /// A single one of them, in the place of all.
+    #[inline(always)]
+    pub(super) fn only(&self, number: usize) -> Self {
+        Self {
+            first: self.at(number),
+            step: 0.0,
+            ..*self
+        }
     }
 }
 

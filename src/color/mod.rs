@@ -22,7 +22,7 @@ mod spectrum;
 mod texels;
 
 pub use bands::Bands;
-pub use comb::{Comb, MAX_BANDS, VISIBLE};
+pub use comb::{Comb, MAX_BANDS, Teeth, VISIBLE};
 pub use difference::{delta_e_76, delta_e_2000};
 pub use model::{Color, ColorModel, Role, luminance, rgb_to_xyz, xyz_to_rgb};
 pub use mono::Mono;

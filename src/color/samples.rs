@@ -3,7 +3,7 @@
 
 use std::ops::{Add, AddAssign, Div, Index, IndexMut, Mul, MulAssign, Sub};
 
-use crate::lanes::{Call, Lanes, Mask as _};
+use crate::lanes::{Call, Lanes, MAX_LANES, Mask as _};
 
 /// The operations on one value a channel that light transport needs.
 pub trait Spectral:
@@ -25,6 +25,8 @@ pub trait Spectral:
     const LANES: usize;
     /// One value a channel.
     fn from_fn(f: impl FnMut(usize) -> f32) -> Self;
+    /// The values.
+    fn values(&self) -> &[f32];
 
     /// The same value everywhere.
     fn splat(value: f32) -> Self {
@@ -58,6 +60,11 @@ impl<const N: usize> Spectral for Samples<N> {
     #[inline]
     fn from_fn(f: impl FnMut(usize) -> f32) -> Self {
         Self(std::array::from_fn(f))
+    }
+
+    #[inline(always)]
+    fn values(&self) -> &[f32] {
+        &self.0
     }
 }
 
@@ -191,7 +198,15 @@ impl<F: Lanes, const N: usize> Spectra<F> for Columns<F, N> {
 
     #[inline(always)]
     fn of<S: Spectral>(rows: &[F::Row; N], lane: usize) -> S {
-        S::from_fn(|channel| rows[channel][lane])
+        if !Self::IN_SQUARES {
+            return S::from_fn(|channel| rows[channel][lane]);
+        }
+        let mut values = [0.0; N];
+        let rows = &rows[lane * (N / F::WIDTH)..];
+        for (values, row) in values.chunks_exact_mut(F::WIDTH).zip(rows) {
+            values.copy_from_slice(row.as_ref());
+        }
+        S::from_fn(|channel| values[channel])
     }
 
     #[inline(always)]
@@ -201,6 +216,13 @@ impl<F: Lanes, const N: usize> Spectra<F> for Columns<F, N> {
 
     #[inline(always)]
     fn from_samples<S: Spectral>(mut sample: impl FnMut(usize) -> S) -> Self {
+        if Self::IN_SQUARES {
+            let mut samples = [S::zero(); MAX_LANES];
+            for (lane, place) in samples[..F::WIDTH].iter_mut().enumerate() {
+                *place = sample(lane);
+            }
+            return done::<F, _, N>(FromSamples::<S, N>(&samples));
+        }
         let mut rows = [F::ROW; N];
         for lane in 0..F::WIDTH {
             let sample = sample(lane);
@@ -226,6 +248,12 @@ impl<F: Lanes, const N: usize> Spectra<F> for Columns<F, N> {
     }
 }
 
+impl<F: Lanes, const N: usize> Columns<F, N> {
+    /// Whether channels and lanes make squares, so that lanes are turned into samples by whole registers. Then each lane has
+    /// the next few of the rows.
+    const IN_SQUARES: bool = F::WIDTH > 1 && N.is_multiple_of(F::WIDTH);
+}
+
 impl<F, const N: usize> Index<usize> for Columns<F, N> {
     type Output = F;
     #[inline(always)]
@@ -244,6 +272,7 @@ struct Product<'a, F, const N: usize>(&'a Columns<F, N>, &'a Columns<F, N>);
 struct Scaled<'a, F, const N: usize>(&'a Columns<F, N>, F);
 struct Choice<'a, F: Lanes, const N: usize>(F::Mask, &'a Columns<F, N>, &'a Columns<F, N>);
 struct ToRows<'a, F, const N: usize>(&'a Columns<F, N>);
+struct FromSamples<'a, S, const N: usize>(&'a [S; MAX_LANES]);
 
 impl<F: Lanes, const N: usize> Call<F> for Sum<'_, F, N> {
     type Output = Columns<F, N>;
@@ -298,10 +327,38 @@ impl<F: Lanes, const N: usize> Call<F> for ToRows<'_, F, N> {
     #[inline(always)]
     fn run(self) -> [F::Row; N] {
         let mut rows = [F::ROW; N];
+        if Columns::<F, N>::IN_SQUARES {
+            for first in (0..N).step_by(F::WIDTH) {
+                let mut square = [F::zero(); MAX_LANES];
+                square[..F::WIDTH].copy_from_slice(&self.0.0[first..][..F::WIDTH]);
+                F::transpose(&mut square);
+                for lane in 0..F::WIDTH {
+                    square[lane].store(&mut rows[(lane * N + first) / F::WIDTH]);
+                }
+            }
+            return rows;
+        }
         for (row, column) in rows.iter_mut().zip(&self.0.0) {
             column.store(row);
         }
         rows
+    }
+}
+
+impl<F: Lanes, S: Spectral, const N: usize> Call<F> for FromSamples<'_, S, N> {
+    type Output = Columns<F, N>;
+    #[inline(always)]
+    fn run(self) -> Columns<F, N> {
+        let mut columns = Columns([F::zero(); N]);
+        for first in (0..N).step_by(F::WIDTH) {
+            let mut square = [F::zero(); MAX_LANES];
+            for (row, sample) in square[..F::WIDTH].iter_mut().zip(self.0) {
+                *row = F::from_slice(&sample.values()[first..]);
+            }
+            F::transpose(&mut square);
+            columns.0[first..][..F::WIDTH].copy_from_slice(&square[..F::WIDTH]);
+        }
+        columns
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::d65::{d65, d65_lanes};
+use super::d65::d65_lanes;
 use super::model::{Color, Role};
 use super::rgb::{check, curve};
 use super::upsample::{Sigmoid, Table, fit};
@@ -71,11 +71,7 @@ impl Upsampled {
     /// At wavelengths in nm.
     #[inline]
     pub(super) fn sample<const N: usize>(&self, wavelengths: &[f32; N]) -> [f32; N] {
-        let shape = wavelengths.map(|l| self.scale * self.sigmoid.eval(l));
-        match self.illuminant {
-            true => std::array::from_fn(|i| shape[i] * d65(wavelengths[i])),
-            false => shape,
-        }
+        wavelengths.map(|l| self.at_lanes(l))
     }
 }
 
