@@ -91,7 +91,9 @@ impl<C: ColorModel, F: Lanes> Call<F> for Draw<'_, C, F> {
                 area.sample_lanes(from, u, w, active)
             }
             Light::Constant(constant) => constant.sample_lanes(from, u, w, active),
+            Light::Directional(light) if light.is_still() => light.sample_lanes(from, u, w, active),
             Light::Envmap(envmap) if envmap.is_still() => envmap.sample_lanes(from, u, w, active),
+            Light::Point(point) if point.is_still() => point.sample_lanes(from, u, w, active),
             _ => self.each(),
         }
     }

@@ -5,12 +5,14 @@ use std::f64::consts::PI;
 
 use glam::{DVec3, Vec2, Vec3};
 
-use super::{Emitter, LightContext, LightSample, mean_of, to_world};
+use super::block::BlockEmitter;
+use super::{Emitter, LightContext, LightSample, LightSamples, mean_of, to_world};
 use crate::color::{ColorModel, Role};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, color, vector};
 use crate::error::Result;
 use crate::interaction::Reference;
+use crate::lanes::{self, Lanes, Mask as _};
 use crate::math::Moving;
 
 /// Where light goes, unit length.
@@ -99,6 +101,36 @@ impl<C: ColorModel> Directional<C> {
             irradiance,
             direction,
         })
+    }
+}
+
+impl<C: ColorModel> Directional<C> {
+    /// Whether it is.
+    pub(super) fn is_still(&self) -> bool {
+        matches!(self.direction, Direction::Still(_))
+    }
+}
+
+impl<C: ColorModel> BlockEmitter<C> for Directional<C> {
+    #[inline(always)]
+    fn sample_lanes<F: Lanes>(
+        &self,
+        _from: lanes::Vec3<F>,
+        _u: lanes::Vec2<F>,
+        w: &[C::Wavelengths],
+        _active: F::Mask,
+    ) -> LightSamples<F, C::Columns<F>> {
+        let Direction::Still(direction) = self.direction else {
+            return LightSamples::none();
+        };
+        LightSamples {
+            direction: lanes::Vec3::all(-direction),
+            distant: F::Mask::splat(true),
+            radiance: C::evaluate_lanes(&self.irradiance, w),
+            pdf: F::one(),
+            delta: F::Mask::splat(true),
+            ..LightSamples::none()
+        }
     }
 }
 

@@ -4,14 +4,17 @@ use std::f64::consts::PI;
 
 use glam::{DVec3, Vec2};
 
+use super::block::BlockEmitter;
 use super::emission::from_point;
-use super::{Ball, Draw, Emission, Emitter, LightContext, LightSample, Origin, Seen, mean_of};
+use super::{
+    Ball, Draw, Emission, Emitter, LightContext, LightSample, LightSamples, Origin, Seen, mean_of,
+};
 use crate::color::{ColorModel, Role};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, color, vector};
 use crate::error::Result;
 use crate::interaction::Reference;
-use crate::lanes::warp;
+use crate::lanes::{self, Lanes, Mask as _, warp};
 
 /// A point that gives light.
 #[derive(Clone, Debug)]
@@ -57,6 +60,39 @@ impl<C: ColorModel> Point<C> {
             intensity,
             position,
         })
+    }
+}
+
+impl<C: ColorModel> Point<C> {
+    /// Whether it is.
+    pub(super) fn is_still(&self) -> bool {
+        matches!(self.position, Origin::Still(_))
+    }
+}
+
+impl<C: ColorModel> BlockEmitter<C> for Point<C> {
+    #[inline(always)]
+    fn sample_lanes<F: Lanes>(
+        &self,
+        from: lanes::Vec3<F>,
+        _u: lanes::Vec2<F>,
+        w: &[C::Wavelengths],
+        _active: F::Mask,
+    ) -> LightSamples<F, C::Columns<F>> {
+        let Origin::Still(position) = self.position else {
+            return LightSamples::none();
+        };
+        let target = lanes::Vec3::all(position);
+        let way = target - from;
+        let squared = way.length_squared();
+        LightSamples {
+            direction: way / squared.sqrt(),
+            target,
+            radiance: C::evaluate_lanes(&self.intensity, w) * (F::one() / squared),
+            pdf: F::select(F::zero().lt(squared), F::one(), F::zero()),
+            delta: F::Mask::splat(true),
+            ..LightSamples::none()
+        }
     }
 }
 
