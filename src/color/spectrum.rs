@@ -159,6 +159,9 @@ impl Spectrum {
             Color::Rgb(rgb) => {
                 check(*rgb, role)?;
                 match role {
+                    Role::Reflectance if rgb[0] == rgb[1] && rgb[1] == rgb[2] => {
+                        Self::Flat(rgb[0] as f32)
+                    }
                     Role::Reflectance => upsampled(1.0, fit(rgb.map(|v| v as f32)), false),
                     Role::Emission | Role::Quantity | Role::Tabulated => of_any_size(rgb, light),
                 }
