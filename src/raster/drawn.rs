@@ -376,6 +376,15 @@ impl<'s> Facets<'s> {
         })
     }
 
+    /// A box around all of it, in its own space.
+    pub(super) fn bounds(&self, kernel: Kernel) -> Bounds {
+        if let FacetsOf::Patches { .. } = self.kind {
+            return bounds(self.geometry);
+        }
+        let boxes = self.runs(kernel).map(|(run, _)| run.bounds);
+        boxes.reduce(|| Bounds::EMPTY, Bounds::union)
+    }
+
     /// A triangle's corners.
     pub(super) fn corners(&self, triangle: usize) -> [DVec3; 3] {
         self.triangles[triangle].map(|i| self.positions[i as usize].as_dvec3())

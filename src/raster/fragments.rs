@@ -67,10 +67,11 @@ impl Task for Fragments<'_, '_> {
             }
             let placed = drawn.find(first.number).0;
             let facets = drawn.facets(placed);
-            let is_of_shape =
-                |look: &&Look| (look.number - placed.first) < facets.triangles.len() as u32;
-            let in_order = |look: &&Look| look.number >= placed.first && is_of_shape(look);
-            let count = looks.iter().take(F::WIDTH).take_while(in_order).count();
+            let of_shape = placed.first..placed.first + facets.triangles.len() as u32;
+            let first_few = looks.iter().take(F::WIDTH);
+            let count = first_few
+                .take_while(|look| of_shape.contains(&look.number))
+                .count();
             let (of_shape, rest) = looks.split_at(count);
             match facets.kind {
                 FacetsOf::Patches { .. } => self.one_by_one(of_shape),

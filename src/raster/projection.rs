@@ -246,6 +246,23 @@ impl Projection {
             || all(&|p| p.y > last.y * p.w)
     }
 
+    /// Two corners of a rectangle outside of which nothing is seen of what these places are the corners of, in pixels; `None`
+    /// where all of it is elsewhere.
+    pub(super) fn extent(&self, corners: &[Place]) -> Option<[DVec2; 2]> {
+        if self.misses_all(corners) {
+            return None;
+        }
+        // What is behind the pinhole in part may be anywhere, as what has no end.
+        let is_behind = |p: &Place| self.is_perspective && p.w < self.near;
+        if corners.iter().any(|p| is_behind(p) || !p.is_finite()) {
+            return Some([DVec2::ZERO, self.size]);
+        }
+        let places = corners.iter().map(|p| DVec2::new(p.x, p.y) / p.w);
+        let none = [DVec2::INFINITY, DVec2::NEG_INFINITY];
+        let [first, last] = places.fold(none, |[first, last], p| [first.min(p), last.max(p)]);
+        Some([first.max(DVec2::ZERO), last.min(self.size)])
+    }
+
     /// How large a pixel is at a place that far along its ray, in world units.
     pub fn pixel(&self, a: f64) -> f64 {
         let size = self.ways.x_axis.length().max(self.ways.y_axis.length());

@@ -142,20 +142,22 @@ impl<'s, C: ColorModel> Shader<'s, C> {
         }
     }
 
-    /// With maps of the shadows of `casters`, if the settings ask for any.
+    /// With maps of the shadows of what is drawn, if the settings ask for any. What shines casts none.
     ///
     /// # Errors
     /// Where there is no memory for the maps.
-    pub fn with_maps(mut self, casters: &Drawn<'_>) -> Result<Self> {
-        let bounds = self.scene.tracer().bounds();
+    pub fn with_maps(mut self, drawn: &Drawn<'_>) -> Result<Self> {
+        let scene = self.scene;
+        let bounds = scene.tracer().bounds();
         let Some(shadows) = self.settings.shadows.filter(|_| !bounds.is_empty()) else {
             return Ok(self);
         };
+        let casters = drawn.without(|shape| scene.shines(shape));
         for lamp in &mut self.lamps {
             let Lamp::Single(id, map) = lamp else {
                 continue;
             };
-            let light = &self.scene.lights()[id.index()];
+            let light = &scene.lights()[id.index()];
             // From the scene's middle nothing may be seen of a light that shines beside it.
             let middle = 0.5 * bounds.min + 0.5 * bounds.max;
             let mut samples =
@@ -175,7 +177,9 @@ impl<'s, C: ColorModel> Shader<'s, C> {
                 Some(target) => Source::At(target),
                 None => Source::Along(-sample.direction),
             };
-            *map = Some(ShadowMap::draw(source, casters, &bounds, shadows)?);
+            let receivers = drawn.without(|shape| scene.light_of(shape) == Some(*id));
+            let drawn = [&casters, &receivers];
+            *map = Some(ShadowMap::draw(source, drawn, &bounds, shadows)?);
         }
         Ok(self)
     }

@@ -10,11 +10,12 @@ use glam::{DMat3, DVec2, DVec3, Vec3};
 
 use super::corners::transformed;
 use super::depth::{DepthCode, DepthFormat};
-use super::drawn::Drawn;
+use super::drawn::{Drawn, Placed};
 use super::projection::Projection;
 use super::visibility::{Canvas, Visibility};
 use crate::error::Result;
 use crate::lanes::{self, Doubles, Lanes, Mask};
+use crate::sensor::Window;
 use crate::shape::Bounds;
 
 /// How maps are made and asked.
@@ -49,14 +50,16 @@ pub(super) struct ShadowMap {
 struct Face {
     projection: Projection,
     code: DepthCode,
+    /// The texels that are drawn. In others nothing is before anything else.
+    window: Window,
     seen: Visibility,
 }
 
 impl ShadowMap {
-    /// Draws what casts shadows within `bounds`, which have an end.
+    /// Draws what casts shadows on some receivers, within `bounds`, which have an end. What casts some receives them too.
     pub(super) fn draw(
         source: Source,
-        casters: &Drawn<'_>,
+        [casters, receivers]: [&Drawn<'_>; 2],
         bounds: &Bounds,
         settings: ShadowSettings,
     ) -> Result<Self> {
@@ -64,15 +67,19 @@ impl ShadowMap {
         let (min, max) = (bounds.min.as_dvec3(), bounds.max.as_dvec3());
         let (centre, radius) = (0.5 * (min + max), 0.5 * max.distance(min));
         let radius = if radius > 0.0 { 1.01 * radius } else { 1.0 };
-        let canvas = Canvas::whole([size; 2]);
+        let whole = Canvas::whole([size; 2]);
         let pixels = DVec2::splat(size.into());
         let mut faces = Vec::new();
         let projections: Vec<Option<Projection>> = match source {
             Source::At(place) => {
                 let place = place.as_dvec3();
                 let far = place.distance(centre) + radius;
-                let axes = [DVec3::X, DVec3::Y, DVec3::Z];
-                let ways = axes.into_iter().flat_map(|axis| [axis, -axis]);
+                // What stands in the middle is best seen by one face.
+                let toward = (centre - place).try_normalize().unwrap_or(DVec3::X);
+                let (right, down) = toward.any_orthonormal_pair();
+                let ways = [toward, right, down]
+                    .into_iter()
+                    .flat_map(|axis| [axis, -axis]);
                 let of = |forward: DVec3| {
                     let (right, down) = forward.any_orthonormal_pair();
                     let corner = forward - right - down;
@@ -93,16 +100,32 @@ impl ShadowMap {
             let Some(projection) = projection.in_pixels(pixels) else {
                 continue;
             };
-            let corners = bounds
-                .corners()
-                .map(|corner| projection.place(corner.as_dvec3()));
-            if projection.misses_all(&corners) {
+            let extent = match settings.bias {
+                // What it does to a surface alone is to be seen too.
+                Some(_) => {
+                    let place = |corner: Vec3| projection.place(corner.as_dvec3());
+                    projection.extent(&bounds.corners().map(place))
+                }
+                None => overlapped(&projection, receivers),
+            };
+            let Some([first, last]) = extent else {
                 continue;
-            }
+            };
+            let (first, last) = (first.floor().as_uvec2(), last.ceil().as_uvec2());
+            let asked = Window {
+                x: first.x,
+                y: first.y,
+                width: last.x - first.x,
+                height: last.y - first.y,
+            };
+            // With the texels that filters take, and one for corners that lie beside their places.
+            let window = asked.grown(settings.filter + 1, &whole.window);
+            let canvas = Canvas { window, ..whole };
             faces.push(Face {
                 seen: Visibility::draw(casters, &projection, &canvas)?,
                 code: DepthCode::new(&projection, DepthFormat::Float),
                 projection,
+                window,
             });
         }
         Ok(Self { settings, faces })
@@ -132,13 +155,13 @@ impl ShadowMap {
                 false => (x.narrow(), y.narrow()),
             };
             let [near, far] = face.projection.range();
-            let size = F::splat(self.settings.size as f32);
+            let window = &face.window;
             let inside = wide(near.next_down()).lt(a)
                 & a.lt(wide(far.next_up()))
-                & F::zero().le(x)
-                & x.lt(size)
-                & F::zero().le(y)
-                & y.lt(size)
+                & F::splat(window.x as f32).le(x)
+                & x.lt(F::splat((window.x + window.width) as f32))
+                & F::splat(window.y as f32).le(y)
+                & y.lt(F::splat((window.y + window.height) as f32))
                 & left;
             if !inside.any() {
                 continue;
@@ -161,15 +184,17 @@ impl ShadowMap {
     /// The share of texels around a place that see nothing nearer.
     #[inline(always)]
     fn share(&self, face: &Face, [x, y]: [f32; 2], code: u32) -> f32 {
-        let (size, filter) = (self.settings.size as usize, self.settings.filter.max(1));
-        let texel = |v: f32, step: u32| {
-            let first = v - 0.5 * (filter - 1) as f32;
-            ((first + step as f32).max(0.0) as usize).min(size - 1)
+        let filter = self.settings.filter.max(1);
+        let Window { width, height, .. } = face.window;
+        let texel = |v: f32, start: u32, count: u32, step: u32| {
+            let first = v - start as f32 - 0.5 * (filter - 1) as f32;
+            ((first + step as f32).max(0.0) as usize).min(count as usize - 1)
         };
         let mut lit = 0;
         for row in 0..filter {
+            let row = texel(y, face.window.y, height, row) * width as usize;
             for column in 0..filter {
-                let pixel = texel(y, row) * size + texel(x, column);
+                let pixel = row + texel(x, face.window.x, width, column);
                 lit += u32::from(face.seen.depth(pixel, 0) <= code);
             }
         }
@@ -177,19 +202,60 @@ impl ShadowMap {
     }
 }
 
+/// The rectangle of a picture in which anything may stand before anything else, in pixels: around all that is drawn but its
+/// largest flat surface, which has no shadow on itself.
+fn overlapped(projection: &Projection, drawn: &Drawn<'_>) -> Option<[DVec2; 2]> {
+    let extent = |placed: &Placed| {
+        let bounds = drawn.facets(placed).bounds(drawn.kernel());
+        if bounds.is_empty() {
+            return None;
+        }
+        let (linear, translation) = placed.matrix();
+        let place = |corner: Vec3| projection.place(linear * corner.as_dvec3() + translation);
+        projection.extent(&bounds.corners().map(place))
+    };
+    let with_flatness = |placed: &Placed| {
+        let is_flat = drawn.facets(placed).geometry.is_flat();
+        Some((extent(placed)?, is_flat))
+    };
+    let mut extents: Vec<_> = drawn.placed().iter().filter_map(with_flatness).collect();
+    let area = |i: &usize| {
+        let ([first, last], _) = extents[*i];
+        (last - first).element_product()
+    };
+    let flat = (0..extents.len()).filter(|i| extents[*i].1);
+    if let Some(largest) = flat.max_by(|a, b| area(a).total_cmp(&area(b))) {
+        extents.swap_remove(largest);
+    }
+    extents
+        .into_iter()
+        .map(|(extent, _)| extent)
+        .reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])])
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::tests::{scene, sensor};
     use super::*;
 
-    /// A square of side 2 at height 1 over a floor, and what a light sees of them.
-    fn map(source: Source, settings: ShadowSettings) -> ShadowMap {
-        let body = "<shape type='rectangle'><transform name='to_world'><translate z='1'/></transform></shape>
-            <shape type='rectangle'><transform name='to_world'><scale value='8'/></transform></shape>";
-        let (scene, sensor, film) = scene(&format!("{}{body}", sensor("perspective", "")));
+    const SQUARE: &str =
+        "<shape type='rectangle'><transform name='to_world'><translate z='1'/></transform></shape>";
+    const FLOOR: &str =
+        "<shape type='rectangle'><transform name='to_world'><scale value='8'/></transform></shape>";
+
+    /// What a light sees of some shapes.
+    fn map_of(bodies: &[&str], source: Source, settings: ShadowSettings) -> ShadowMap {
+        let bodies = bodies.concat();
+        let (scene, sensor, film) = scene(&format!("{}{bodies}", sensor("perspective", "")));
         let projection = Projection::of_sensor(&sensor, &film, 0.0).unwrap();
         let drawn = Drawn::new(scene.tracer(), &projection, 0.0, |_| true).unwrap();
-        ShadowMap::draw(source, &drawn, &scene.tracer().bounds(), settings).unwrap()
+        let bounds = scene.tracer().bounds();
+        ShadowMap::draw(source, [&drawn; 2], &bounds, settings).unwrap()
+    }
+
+    /// Of a square of side 2 at height 1 over a floor.
+    fn map(source: Source, settings: ShadowSettings) -> ShadowMap {
+        map_of(&[SQUARE, FLOOR], source, settings)
     }
 
     fn at(map: &ShadowMap, position: Vec3, cosine: f32) -> f32 {
@@ -219,6 +285,41 @@ mod tests {
                 assert_eq!(lit, if x < half { 0.0 } else { 1.0 }, "{source:?} {x}");
             }
             assert_eq!(at(&map, Vec3::new(0.2, 0.3, 1.0), 1.0), 1.0, "{source:?}");
+        }
+    }
+
+    #[test]
+    fn texels_are_drawn_where_something_may_stand_before_another() {
+        for source in [
+            Source::At(Vec3::new(0.0, 0.0, 4.0)),
+            Source::Along(Vec3::NEG_Z),
+        ] {
+            let drawn = |bodies: &[&str], settings| {
+                let map = map_of(bodies, source, settings);
+                let texels = map
+                    .faces
+                    .iter()
+                    .map(|face| face.window.width * face.window.height);
+                (texels.sum::<u32>(), map)
+            };
+            let (none, alone) = drawn(&[FLOOR], SETTINGS);
+            assert_eq!(none, 0, "{source:?}");
+            assert_eq!(at(&alone, Vec3::new(1.0, 2.0, 0.0), 1.0), 1.0);
+            let shown = ShadowSettings {
+                bias: Some(0.0),
+                ..SETTINGS
+            };
+            let (all, _) = drawn(&[FLOOR], shown);
+            let (some, _) = drawn(&[SQUARE, FLOOR], SETTINGS);
+            assert!(0 < some && some < all / 2, "{source:?} {some} {all}");
+            // What is behind a flat surface is in its shadow.
+            let below = "<shape type='sphere'><point name='center' x='3' y='2' z='-2'/></shape>";
+            let (_, map) = drawn(&[FLOOR, below], SETTINGS);
+            for turn in 0..100 {
+                let (y, x) = (0.1 * turn as f32).sin_cos();
+                let place = Vec3::new(3.0 + 0.9 * x, 2.0 + 0.9 * y, -1.6);
+                assert_eq!(at(&map, place, 0.4), 0.0, "{source:?} {place}");
+            }
         }
     }
 

@@ -92,10 +92,9 @@ pub(super) fn draw<C: ColorModel>(
         cull: raster.cull,
     };
     let seen = Visibility::draw(&drawn, &projection, &canvas)?;
-    let casters = drawn.without(|shape| scene.shines(shape));
     let shader = |pass| {
         let wavelengths = scene.color().wavelengths_of(pass, || 0.5);
-        Shader::new(scene, raster.shade, wavelengths, time).with_maps(&casters)
+        Shader::new(scene, raster.shade, wavelengths, time).with_maps(&drawn)
     };
     let picture = Picture {
         shaders: (0..scene.color().passes())

@@ -167,7 +167,12 @@ impl<C: ColorModel> Scene<C> {
 
     /// The light that the surface at a point is.
     pub fn light_at(&self, at: &Interaction<'_>) -> Option<LightId> {
-        self.surfacing[at.shape as usize].light
+        self.light_of(at.shape)
+    }
+
+    /// The light that a shape is.
+    pub fn light_of(&self, shape: u32) -> Option<LightId> {
+        self.surfacing[shape as usize].light
     }
 
     /// Whether the surface that was hit, if any, is a light.
@@ -213,7 +218,7 @@ impl<C: ColorModel> Scene<C> {
 
     /// Whether a shape is a light.
     pub fn shines(&self, shape: u32) -> bool {
-        self.surfacing[shape as usize].light.is_some()
+        self.light_of(shape).is_some()
     }
 
     /// The material with that index.

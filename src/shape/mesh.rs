@@ -65,6 +65,11 @@ impl TriangleMesh {
         &self.mesh
     }
 
+    /// Whether it is a rectangle, as far as is known.
+    pub(super) fn is_rectangle(&self) -> bool {
+        self.quad.is_some()
+    }
+
     /// The triangles, without what was made for light samples.
     pub(super) fn into_mesh(self) -> Mesh {
         self.mesh

@@ -188,6 +188,15 @@ impl Geometry {
             _ => None,
         }
     }
+
+    /// Whether all of it is known to lie in a plane.
+    pub fn is_flat(&self) -> bool {
+        match self {
+            Self::Plane(_) | Self::Disk(_) => true,
+            Self::Mesh(mesh) => mesh.is_rectangle(),
+            _ => false,
+        }
+    }
 }
 
 impl Geometry {
