@@ -7,6 +7,9 @@ use std::collections::TryReserveError;
 
 use rayon::prelude::*;
 
+/// The size of a huge page. On machines with others this is only an alignment, and less is advised of.
+pub(crate) const HUGE: usize = 2 << 20;
+
 /// So many values, made by all threads.
 ///
 /// # Errors
@@ -17,34 +20,27 @@ pub(crate) fn filled<T: Send>(
 ) -> Result<Vec<T>, TryReserveError> {
     let mut values = Vec::new();
     values.try_reserve_exact(count)?;
-    #[cfg(target_os = "linux")]
-    advise(&values);
+    advise(values.as_ptr(), values.capacity());
     values.par_extend((0..count).into_par_iter().map(|_| value()));
     Ok(values)
 }
 
 /// Asks for huge pages wherever an array's memory fills them.
-#[cfg(target_os = "linux")]
-fn advise<T>(values: &Vec<T>) {
-    use rustix::mm::{Advice, madvise};
-    /// On machines with others this only leaves less to be advised of.
-    const PAGE: usize = 2 << 20;
-    let size = values.capacity() * size_of::<T>();
-    let start = values.as_ptr().cast::<u8>();
-    let before = start.align_offset(PAGE);
-    if size < PAGE || before > size - PAGE {
+pub(crate) fn advise<T>(array: *const T, count: usize) {
+    let start = array.cast::<u8>();
+    let size = count.saturating_mul(size_of::<T>());
+    let before = start.align_offset(HUGE);
+    if size < HUGE || before > size - HUGE {
         return;
     }
-    let size = (size - before) / PAGE * PAGE;
-    // SAFETY: within the array's memory, whose contents the advice leaves as they are. Where it is not taken nothing but time is
-    // lost.
-    let _ = unsafe {
-        madvise(
-            start.add(before).cast_mut().cast(),
-            size,
-            Advice::LinuxHugepage,
-        )
-    };
+    #[cfg(target_os = "linux")]
+    {
+        use rustix::mm::{Advice, madvise};
+        let first = start.wrapping_add(before).cast_mut().cast();
+        let size = (size - before) / HUGE * HUGE;
+        // SAFETY: the advice leaves what memory holds as it is, whosever it is. Where it is not taken nothing but time is lost.
+        let _ = unsafe { madvise(first, size, Advice::LinuxHugepage) };
+    }
 }
 
 #[cfg(test)]

@@ -17,9 +17,7 @@ use rayon::prelude::*;
 
 use super::node::{Block, MovingBlock, MovingNode, Node};
 use crate::file::read_at;
-
-/// The size of a huge page; on machines with others this is only an alignment.
-const PAGE: usize = 2 << 20;
+use crate::pages::{self, HUGE};
 
 /// Values that any bits make, zeros too, and that have no gaps between their fields.
 ///
@@ -65,7 +63,7 @@ impl<T: Plain> Huge<T> {
         let layout = Layout::array::<T>(count).expect("less than the address space");
         #[cfg(target_os = "linux")]
         // Small arrays share pages with others.
-        if layout.size() >= PAGE / 2 {
+        if layout.size() >= HUGE / 2 {
             return Self::in_pages(count, layout);
         }
         let start = match layout.size() {
@@ -83,8 +81,8 @@ impl<T: Plain> Huge<T> {
 
     #[cfg(target_os = "linux")]
     fn in_pages(count: usize, layout: Layout) -> Self {
-        use rustix::mm::{Advice, MapFlags, ProtFlags, madvise, mmap_anonymous};
-        let size = layout.size() + PAGE;
+        use rustix::mm::{MapFlags, ProtFlags, mmap_anonymous};
+        let size = layout.size() + HUGE;
         let access = ProtFlags::READ | ProtFlags::WRITE;
         let nowhere = std::ptr::null_mut();
         // SAFETY: new memory, where the system has room for it.
@@ -94,9 +92,8 @@ impl<T: Plain> Huge<T> {
             .and_then(|pages| NonNull::new(pages.cast::<u8>()));
         let pages = pages.unwrap_or_else(|| handle_alloc_error(layout));
         // SAFETY: less than a page beyond the beginning, of which there is one more than is asked for.
-        let start = unsafe { pages.add(pages.align_offset(PAGE)) }.cast::<T>();
-        // SAFETY: memory of this array. Where the advice is not taken nothing but time is lost.
-        let _ = unsafe { madvise(start.as_ptr().cast(), layout.size(), Advice::LinuxHugepage) };
+        let start = unsafe { pages.add(pages.align_offset(HUGE)) }.cast::<T>();
+        pages::advise(start.as_ptr(), count);
         Self {
             start,
             count,
@@ -114,8 +111,8 @@ impl<T: Plain> Huge<T> {
                 size_of_val(&*values),
             )
         };
-        let parts = bytes.par_chunks_mut(PAGE).enumerate();
-        parts.try_for_each(|(part, bytes)| read_at(file, at + (part * PAGE) as u64, bytes))?;
+        let parts = bytes.par_chunks_mut(HUGE).enumerate();
+        parts.try_for_each(|(part, bytes)| read_at(file, at + (part * HUGE) as u64, bytes))?;
         Ok(values)
     }
 
