@@ -98,9 +98,8 @@ impl<C: ColorModel> Shooting<'_, C> {
                 }
             }
             let wanted = count.saturating_sub(photons.len()).div_ceil(CHAINS);
-            let groups: Vec<(usize, &[(Numbers, f32)])> =
-                starts.chunks(TOGETHER).enumerate().collect();
-            let found: Vec<Vec<Photon>> = (groups.into_par_iter())
+            let groups = starts.par_chunks(TOGETHER).enumerate();
+            let found: Vec<Vec<Photon>> = groups
                 .map(|(group, starts)| self.chains(group as u64, starts, wanted * starts.len()))
                 .collect();
             photons.extend(found.into_iter().flatten());
@@ -116,8 +115,8 @@ impl<C: ColorModel> Shooting<'_, C> {
             if found.len() >= ENOUGH || (round >= EMPTY_ROUNDS && found.is_empty()) {
                 break;
             }
-            let parts = (0..ROUND).step_by(TOGETHER).collect::<Vec<u32>>();
-            let parts: Vec<Vec<(Numbers, Found)>> = (parts.into_par_iter())
+            let parts = (0..ROUND).into_par_iter().step_by(TOGETHER);
+            let parts: Vec<Vec<(Numbers, Found)>> = parts
                 .map(|first| {
                     let first = round * ROUND + first;
                     let paths = first..first + TOGETHER as u32;
