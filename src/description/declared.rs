@@ -161,11 +161,13 @@ impl fmt::Display for Range {
         let Self { least, most, above } = self;
         match (least.is_finite(), most.is_finite()) {
             (false, false) => f.write_str("any number"),
-            (true, false) if *above => write!(f, "above {least}"),
-            (true, false) => write!(f, "at least {least}"),
+            (true, false) if *above => write!(f, "above {}", Short(*least)),
+            (true, false) => write!(f, "at least {}", Short(*least)),
             (false, true) => write!(f, "at most {}", Short(*most)),
-            (true, true) if *above => write!(f, "above {least} and at most {}", Short(*most)),
-            (true, true) => write!(f, "from {least} to {}", Short(*most)),
+            (true, true) if *above => {
+                write!(f, "above {} and at most {}", Short(*least), Short(*most))
+            }
+            (true, true) => write!(f, "from {} to {}", Short(*least), Short(*most)),
         }
     }
 }

@@ -34,6 +34,7 @@ pub use self::canonical::{Canonical, Part};
 pub use self::properties::Properties;
 use self::reader::Reader;
 use self::resolve::Scopes;
+pub(crate) use self::transform::LATEST;
 pub use self::values::spectrum_file;
 pub use self::written::escaped;
 use crate::budget::Budget;

@@ -10,8 +10,8 @@ use super::values::{number, numbers, vector, xyz};
 use crate::error::{Error, Result};
 use crate::math::moving::{Pose, Unmovable};
 
-/// Times that single precision can hold.
-const LATEST: f64 = 1e30;
+/// How far from 0 times may be: single precision holds them, and what lies between.
+pub(crate) const LATEST: f64 = 1e30;
 
 const OPERATIONS: [&str; 5] = ["translate", "rotate", "scale", "lookat", "matrix"];
 

@@ -39,6 +39,16 @@ pub(super) fn draws(description: &Description, options: &Options) -> bool {
     draws && !options.by_blocks()
 }
 
+/// What is said where samples come one by one.
+pub(super) fn by_rays() -> Problem {
+    let message =
+        "the z-buffer draws whole images: here rays find what is seen and what is in shadow";
+    let error = Error::unsupported(message);
+    let help =
+        "the image differs from a whole one at edges, by its shadows, and where something moves";
+    error.help(help).problems()[0].clone()
+}
+
 /// What was drawn.
 pub(super) struct Rastered {
     pub(super) sums: Sums,

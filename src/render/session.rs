@@ -158,8 +158,11 @@ impl Task for Render<'_> {
             report.spp = foveated.mean_spp.round() as u32;
             report.foveated = Some(foveated);
         }
-        if let (Integrator::Raster(raster), false) = (&job.view.integrator, options.by_blocks()) {
-            report.spp = raster.pattern.count() as u32;
+        if let Integrator::Raster(raster) = &job.view.integrator {
+            match options.by_blocks() {
+                false => report.spp = raster.pattern.count() as u32,
+                true => warnings.push(rastered::by_rays()),
+            }
         }
         tell(&mut report, &tally, &job.view.film);
         warnings.extend(notes);
@@ -259,6 +262,9 @@ impl Task for Part<'_> {
         report.passes = Some(head.passes.clone());
         let mut warnings = job.warnings.clone();
         warnings.extend(tally.warning());
+        if let Integrator::Raster(_) = &job.view.integrator {
+            warnings.push(rastered::by_rays());
+        }
         if let Some(kept) = &mut self.ask.shelf.kept {
             kept.told();
         }

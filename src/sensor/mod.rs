@@ -12,7 +12,7 @@ mod thinlens;
 use glam::{Mat3, Mat4, Vec2, Vec3};
 
 use crate::description::declared::{Row, float, motion, nested};
-use crate::description::{Kind, Properties};
+use crate::description::{Kind, LATEST, Properties};
 use crate::error::Result;
 use crate::family::family;
 use crate::interaction::Ray;
@@ -173,8 +173,10 @@ const MOUNT: &[Row] = &[
 
 /// What every sensor reads.
 const COMMON: &[Row] = &[
-    float("shutter_open", 0.0, "when light begins to count"),
-    float("shutter_close", 0.0, "when it ends").absent("shutter_open"),
+    float("shutter_open", 0.0, "when light begins to count").between(-LATEST, LATEST),
+    float("shutter_close", 0.0, "when it ends")
+        .between(-LATEST, LATEST)
+        .absent("shutter_open"),
     nested(Kind::Film, "size, pixel format and filter"),
     nested(Kind::Sampler, "where samples lie, and how many"),
     nested(Kind::Medium, "what the sensor stands in"),

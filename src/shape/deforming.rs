@@ -60,6 +60,8 @@ pub enum Mismatch {
     Triangle(usize),
     /// One has normals and the other has none.
     Normals,
+    /// The vertex with this number goes farther from the mesh before than single precision tells.
+    Far(usize),
 }
 
 impl std::fmt::Display for Mismatch {
@@ -76,6 +78,10 @@ impl std::fmt::Display for Mismatch {
             Self::Normals => {
                 f.write_str("one of it and the first mesh has normals, and the other has none")
             }
+            Self::Far(i) => write!(
+                f,
+                "its vertex {i} is farther than 3.4e38 from where the mesh before has it"
+            ),
         }
     }
 }
@@ -101,22 +107,26 @@ impl DeformingMesh {
         );
         let mut meshes = meshes.into_iter();
         let first = meshes.next().expect("two meshes at least");
-        let mut later = Vec::with_capacity(meshes.len());
+        let mut whole = Self {
+            first,
+            later: Vec::with_capacity(meshes.len()),
+            times,
+        };
         for (number, mesh) in (1..).zip(meshes) {
             let mesh = mesh.into_mesh();
-            match mismatch(first.mesh(), &mesh) {
-                Some(why) => return Err((number, why)),
-                None => later.push(Vertices {
-                    positions: mesh.positions,
-                    normals: mesh.normals,
-                }),
+            if let Some(why) = mismatch(whole.mesh(), &mesh) {
+                return Err((number, why));
             }
+            let mut ways = whole.positions(number - 1).iter().zip(&mesh.positions);
+            if let Some(vertex) = ways.position(|(a, b)| !(*b - *a).is_finite()) {
+                return Err((number, Mismatch::Far(vertex)));
+            }
+            whole.later.push(Vertices {
+                positions: mesh.positions,
+                normals: mesh.normals,
+            });
         }
-        Ok(Self {
-            first,
-            later,
-            times,
-        })
+        Ok(whole)
     }
 
     /// The mesh at its first time.
@@ -331,8 +341,9 @@ impl Sets {
             error.help("write them as 0, 0.5, 1")
         })?;
         if times.len() != count && !animated {
-            let message = format!("{} times for {count} files", times.len());
-            return Err(properties.error("times", message));
+            let message = format!("there are {} times, and {count} files", times.len());
+            let error = properties.error("times", message);
+            return Err(error.help("give each file a time, in the order of their numbers"));
         }
         let ascend = times
             .windows(2)
@@ -409,20 +420,26 @@ pub(super) fn joined(
     }
     let mesh = DeformingMesh::new(meshes, times).map_err(|(number, why)| {
         // Of an animation there are times in place of files.
-        let name = match properties.has(&file_name(number)) {
-            true => file_name(number),
-            false => "times".to_owned(),
+        let name_of = |number: usize| match number {
+            0 => "filename".to_owned(),
+            _ if properties.has(&file_name(number)) => file_name(number),
+            _ => "times".to_owned(),
         };
         let (first, now) = (dropped[0], dropped[number]);
         if first != now && !matches!(why, Mismatch::Vertices(..)) {
+            let worse = if first > now { 0 } else { number };
+            let (most, least) = (first.max(now), first.min(now));
             let message = format!(
-                "{now} of its triangles have a corner whose place is not finite, and of the first mesh {first}"
+                "{most} of its triangles have a corner whose place is not finite, and {least} of another mesh's"
             );
-            let error = properties.error(&name, message);
+            let error = properties.error(&name_of(worse), message);
             return error.help("give each vertex a place at all times");
         }
-        let error = properties.error(&name, why.to_string());
-        error.help("a mesh that deforms has the same triangles at all times")
+        let error = properties.error(&name_of(number), why.to_string());
+        match why {
+            Mismatch::Far(_) => error.help("make it smaller"),
+            _ => error.help("a mesh that deforms has the same triangles at all times"),
+        }
     })?;
     Ok(Shape {
         geometry: Geometry::Deforming(mesh),
@@ -506,8 +523,24 @@ mod tests {
             Err((2, Mismatch::Triangle(3)))
         );
         assert_eq!(changed(|m| m.normals.clear()), Err((2, Mismatch::Normals)));
+        assert_eq!(changed(|m| m.positions[4].y = 3e38), Ok(()));
         let vertices = mesh::cube().positions.len();
         let more = changed(|m| m.positions.push(Vec3::ZERO));
         assert_eq!(more, Err((2, Mismatch::Vertices(vertices, vertices + 1))));
+    }
+
+    #[test]
+    fn what_goes_farther_than_numbers_tell_is_refused() {
+        let at = |z: f32| {
+            let mut cube = mesh::cube();
+            cube.positions[4].z = z;
+            TriangleMesh::new(cube)
+        };
+        let way = |a: f32, b: f32| {
+            let sets = vec![at(a), at(0.0), at(a), at(b)];
+            DeformingMesh::new(sets, vec![0.0, 1.0, 2.0, 3.0]).map(|_| ())
+        };
+        assert_eq!(way(3e38, 1e37), Ok(()));
+        assert_eq!(way(3e38, -1e38), Err((3, Mismatch::Far(4))));
     }
 }

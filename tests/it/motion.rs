@@ -520,7 +520,7 @@ fn what_makes_no_motion_is_told_where_it_stands() {
         (sheet(&name(0, "sheet-1.obj")), 3, "the first file is \"filename\""),
         (sheet(&name(2, "sheet-1.obj")), 2, "there is no \"filename_1\""),
         (sheet("<string name='times' value='0, 1'/>"), 3, "there is one"),
-        (sheet(&(name(1, "sheet-1.obj") + "<string name='times' value='0'/>")), 4, "1 times for 2 files"),
+        (sheet(&(name(1, "sheet-1.obj") + "<string name='times' value='0'/>")), 4, "there are 1 times, and 2 files"),
         (sheet(&(name(1, "sheet-1.obj") + "<string name='times' value='1, 1'/>")), 4, "each after the one before"),
         (sheet(&(name(1, "sheet-1.obj") + "<string name='times' value='a, b'/>")), 4, "are no numbers"),
         (sheet(&(name(1, "nowhere.obj"))), 3, "nowhere.obj"),
