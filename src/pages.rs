@@ -3,26 +3,38 @@
 
 #![allow(unsafe_code)]
 
-use std::collections::TryReserveError;
-
-use rayon::prelude::*;
+use std::alloc::{Layout, alloc_zeroed};
+use std::sync::atomic::AtomicU64;
 
 /// The size of a huge page. On machines with others this is only an alignment, and less is advised of.
 pub(crate) const HUGE: usize = 2 << 20;
 
-/// So many values, made by all threads.
+/// Numbers that are 0 where all their bits are.
 ///
-/// # Errors
-/// Where there is no memory for them.
-pub(crate) fn filled<T: Send>(
-    count: usize,
-    value: impl Fn() -> T + Sync + Send,
-) -> Result<Vec<T>, TryReserveError> {
-    let mut values = Vec::new();
-    values.try_reserve_exact(count)?;
-    advise(values.as_ptr(), values.capacity());
-    values.par_extend((0..count).into_par_iter().map(|_| value()));
-    Ok(values)
+/// # Safety
+/// So it must be.
+pub(crate) unsafe trait Zero {}
+
+// SAFETY: as IEEE 754 has it.
+unsafe impl Zero for f64 {}
+// SAFETY: an integer's memory.
+unsafe impl Zero for AtomicU64 {}
+
+/// So many zeros, which the system makes when they are first touched, for the thread that does so; `None` where there is no
+/// memory for them.
+pub(crate) fn zeros<T: Zero>(count: usize) -> Option<Vec<T>> {
+    let layout = Layout::array::<T>(count).ok()?;
+    if layout.size() == 0 {
+        return Some(Vec::new());
+    }
+    // SAFETY: the layout has a size.
+    let array = unsafe { alloc_zeroed(layout) }.cast::<T>();
+    if array.is_null() {
+        return None;
+    }
+    advise(array, count);
+    // SAFETY: allocated with the layout of so many values, all of them zeros.
+    Some(unsafe { Vec::from_raw_parts(array, count, count) })
 }
 
 /// Asks for huge pages wherever an array's memory fills them.
@@ -48,12 +60,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn arrays_of_any_size_are_filled() {
+    fn arrays_of_any_size_are_zeros() {
         for count in [0, 1, 1000, (5 << 20) / 8, (9 << 20) / 8 + 3] {
-            let values = filled(count, || 7_u64).unwrap();
+            let mut values = zeros::<f64>(count).unwrap();
             assert_eq!(values.len(), count);
-            assert!(values.iter().all(|value| *value == 7));
+            assert!(values.iter().all(|value| value.to_bits() == 0));
+            values.fill(7.0);
+            values.push(8.0);
+            assert_eq!(values.iter().sum::<f64>(), 7.0 * count as f64 + 8.0);
         }
-        assert!(filled(usize::MAX / 8, || 7_u64).is_err());
+        assert!(zeros::<f64>(usize::MAX / 4).is_none());
     }
 }

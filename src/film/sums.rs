@@ -165,7 +165,7 @@ impl Rows<'_> {
 
 /// So many zeros, unless the memory for them is not there.
 pub(crate) fn zeros(count: usize, film: &Window) -> Result<Vec<f64>> {
-    pages::filled(count, || 0.0).map_err(|_| {
+    pages::zeros(count).ok_or_else(|| {
         Error::input(format!(
             "a film of {} × {} pixels does not fit into memory",
             film.width, film.height

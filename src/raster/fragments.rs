@@ -59,11 +59,11 @@ impl Task for Fragments<'_, '_> {
         let mut looks = self.looks;
         while let Some(first) = looks.first() {
             // The memory of a fine mesh is far off.
-            for ahead in looks.iter().skip(2 * F::WIDTH).take(F::WIDTH) {
-                drawn.fetch(ahead.number);
+            for number in new_numbers(looks, 2 * F::WIDTH, F::WIDTH) {
+                drawn.fetch(number);
             }
-            for ahead in looks.iter().skip(F::WIDTH).take(F::WIDTH) {
-                drawn.fetch_corners(ahead.number);
+            for number in new_numbers(looks, F::WIDTH, F::WIDTH) {
+                drawn.fetch_corners(number);
             }
             let placed = drawn.find(first.number).0;
             let facets = drawn.facets(placed);
@@ -80,6 +80,14 @@ impl Task for Fragments<'_, '_> {
             looks = rest;
         }
     }
+}
+
+/// The triangles of `count` places from `first` on that are not those of the places before.
+fn new_numbers(looks: &[Look], first: usize, count: usize) -> impl Iterator<Item = u32> {
+    let end = looks.len().min(first + count);
+    let pairs = looks[first.min(end) - 1..end].windows(2);
+    let changes = pairs.filter(|pair| pair[0].number != pair[1].number);
+    changes.map(|pair| pair[1].number)
 }
 
 impl Fragments<'_, '_> {

@@ -5,6 +5,7 @@
 //! neighbouring pixels see texture coordinates change; at corners of triangles by the finest level.
 
 use std::f32::consts::FRAC_1_PI;
+use std::ops::Range;
 
 use glam::{Vec2, Vec3};
 
@@ -258,18 +259,28 @@ impl<'s, C: ColorModel> Shader<'s, C> {
         mut blocked: Option<&mut Blocked<'_>>,
         colors: &mut Vec<C::Sample>,
     ) {
-        let material = |i: u32| self.scene.material_of(&batch.hits[i as usize]).index();
-        let mut indices: Vec<u32> = (0..batch.hits.len() as u32).collect();
-        indices.sort_by_key(|i| material(*i));
+        // Neighbours are of one shape as a rule.
+        let mut end = 0;
+        let of_shapes = batch.hits.chunk_by(|a, b| a.shape == b.shape).map(|hits| {
+            let first = end;
+            end += hits.len() as u32;
+            (self.scene.material_of(&hits[0]).index(), first..end)
+        });
+        let mut runs: Vec<(usize, Range<u32>)> = of_shapes.collect();
+        runs.sort_by_key(|(material, _)| *material);
         colors.clear();
         colors.resize(batch.hits.len(), C::Sample::zero());
-        for run in indices.chunk_by(|a, b| material(*a) == material(*b)) {
+        let mut indices = Vec::with_capacity(batch.hits.len());
+        for runs in runs.chunk_by(|a, b| a.0 == b.0) {
+            let material = runs[0].0;
+            indices.clear();
+            indices.extend(runs.iter().flat_map(|(_, places)| places.clone()));
             let of_one = OfOneMaterial {
                 shader: self,
-                material: self.scene.material_at(material(run[0])),
-                is_mirror: self.mirrors[material(run[0])],
+                material: self.scene.material_at(material),
+                is_mirror: self.mirrors[material],
                 batch,
-                indices: run,
+                indices: &indices,
                 blocked: blocked.as_deref_mut(),
                 colors,
             };

@@ -97,7 +97,7 @@ impl Visibility {
         let samples = pattern.count();
         let size = [window.width, window.height];
         let count = size[0] as usize * size[1] as usize * samples;
-        let keys = pages::filled(count, AtomicU64::default).map_err(|_| {
+        let keys = pages::zeros(count).ok_or_else(|| {
             let [width, height] = size;
             Error::input(format!(
                 "a z-buffer of {width} × {height} pixels of {samples} samples does not fit into memory"
