@@ -67,27 +67,11 @@ unsafe impl Lanes for Avx512 {
 
     #[inline(always)]
     unsafe fn inside(block: &Block, way: Option<&Corners>, ray: &State) -> u32 {
-        /// Three corners of four triangles.
-        const LANES: u16 = 0xfff;
-        // SAFETY: the caller has AVX-512; `ray.axes` holds offsets of the block's axes, and of those of the way, and what
-        // is not of an axis is not loaded.
+        // SAFETY: the caller has AVX-512.
         unsafe {
-            let at = |corners: &[[[f32; BLOCK]; 3]; 3], axis: usize| {
-                let offset = usize::from(ray.axes[axis]);
-                _mm512_maskz_loadu_ps(LANES, corners.as_ptr().byte_add(offset).cast())
-            };
-            let from_origin = |axis: usize| {
-                let first = at(&block.corners, axis);
-                let corners = match way {
-                    Some(Corners(way)) => {
-                        let gone = _mm512_mul_ps(at(way, axis), _mm512_set1_ps(ray.part));
-                        _mm512_add_ps(first, gone)
-                    }
-                    None => first,
-                };
-                _mm512_sub_ps(corners, _mm512_set1_ps(ray.sheared_origin[axis]))
-            };
-            let (x, y, z) = (from_origin(0), from_origin(1), from_origin(2));
+            let x = from_origin(block, way, ray, 0);
+            let y = from_origin(block, way, ray, 1);
+            let z = from_origin(block, way, ray, 2);
             let x = _mm512_sub_ps(x, _mm512_mul_ps(_mm512_set1_ps(ray.shear[0]), z));
             let y = _mm512_sub_ps(y, _mm512_mul_ps(_mm512_set1_ps(ray.shear[1]), z));
             // Of the corners a, b, c and the corners c, a, b the edge functions w, u and v.
@@ -129,5 +113,38 @@ unsafe impl Lanes for Avx512 {
                 put(&mut ends.rest, there & rest);
             }
         }
+    }
+}
+
+/// The corners of a block as they stand for a ray, from its origin along one of its shear's axes: three of four triangles.
+///
+/// # Safety
+/// The processor has AVX-512.
+#[inline(always)]
+unsafe fn from_origin(block: &Block, way: Option<&Corners>, ray: &State, axis: usize) -> __m512 {
+    let offset = usize::from(ray.axes[axis]);
+    // SAFETY: the offset is that of an axis.
+    unsafe {
+        let mut corners = along(&block.corners, offset);
+        if let Some(Corners(way)) = way {
+            let gone = _mm512_mul_ps(along(way, offset), _mm512_set1_ps(ray.part));
+            corners = _mm512_add_ps(corners, gone);
+        }
+        _mm512_sub_ps(corners, _mm512_set1_ps(ray.sheared_origin[axis]))
+    }
+}
+
+/// The coordinates of an axis, which begin so many bytes further on. They are loaded in two parts: a mask is a constant that a
+/// compiler may put into 16 bits of a register in each round of a loop, so that each waits for the round before.
+///
+/// # Safety
+/// The processor has AVX-512, and so many bytes further on an axis begins.
+#[inline(always)]
+unsafe fn along(corners: &[[[f32; BLOCK]; 3]; 3], offset: usize) -> __m512 {
+    // SAFETY: what is not of the axis is not loaded.
+    unsafe {
+        let first = corners.as_ptr().byte_add(offset).cast::<f32>();
+        let two = _mm512_zextps256_ps512(_mm256_loadu_ps(first));
+        _mm512_insertf32x4::<2>(two, _mm_loadu_ps(first.add(2 * BLOCK)))
     }
 }
