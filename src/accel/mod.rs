@@ -7,6 +7,7 @@
 
 mod boxes;
 mod group;
+mod lone;
 mod met;
 mod triangle;
 mod walk;

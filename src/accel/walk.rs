@@ -4,12 +4,14 @@
 use std::cmp::Ordering;
 
 use crate::interaction::{Hit, Ray};
+use crate::lanes::MAX_LANES;
 use crate::shape::{Bounds, Geometry};
 
 use super::boxes::RayBoxes;
-use super::group::{Group, Item};
+use super::group::Item;
+use super::lone::Lone;
 use super::triangle::Shear;
-use super::wide::{Best, Met, Needs, Place, Start, Tree, Visit, Walker};
+use super::wide::{Best, Met, Needs, Place, Start, Visit, Walker};
 use super::{Counts, Instance, Method, Order, Tracer, to_local};
 
 /// See the module.
@@ -20,12 +22,12 @@ pub(super) struct Walk<'t> {
 
 /// The way by which a group is met.
 #[derive(Clone, Copy, Debug)]
-struct Way {
-    group: u32,
+pub(super) struct Way {
+    pub(super) group: u32,
     /// The instance through which the group is met, or [`Hit::NONE`].
-    instance: u32,
+    pub(super) instance: u32,
     /// Where the ray enters the instance's box.
-    entry: f32,
+    pub(super) entry: f32,
 }
 
 const WORLD: Way = Way {
@@ -70,16 +72,16 @@ impl<'t> Walk<'t> {
             return self.items::<_, ANY>(way, group.items(), rays, ledger);
         }
         let mut counts = Counts::default();
-        let door = tracer.alone.filter(|_| way.instance == Hit::NONE);
-        let door = door.and_then(|instance| Door::of(tracer, instance));
-        let (way, tree) = match &door {
-            Some(door) => (door.way, door.tree),
+        let lone = tracer.alone.filter(|_| way.instance == Hit::NONE);
+        let lone = lone.and_then(|instance| Lone::new(tracer, instance));
+        let (way, tree) = match &lone {
+            Some(lone) => (lone.way(), lone.tree()),
             None => (way, group.tree()),
         };
         let mut party = Party::<_, ANY> {
             walk: self,
             way,
-            door,
+            lone,
             rays,
             ledger,
         };
@@ -91,7 +93,7 @@ impl<'t> Walk<'t> {
         let needs = Needs {
             inner_levels: tracer.inner_levels,
             fetch: tracer.is_large,
-            later: tracer.deforms || party.door.is_some(),
+            later: tracer.deforms || party.lone.is_some(),
             others: tracer.has_others,
         };
         tree.batch::<_, ANY>(kernel, needs, &mut party, count, &mut counts);
@@ -250,54 +252,13 @@ impl Ledger for Shadows<'_> {
     }
 }
 
-/// The way into the instance that is all there is in the world: rays begin in its tree, those that miss its box end there.
-#[derive(Clone, Copy, Debug)]
-struct Door<'t> {
-    way: Way,
-    instance: &'t Instance,
-    bounds: &'t Bounds,
-    group: &'t Group,
-    tree: &'t Tree,
-}
-
-impl<'t> Door<'t> {
-    fn of(tracer: &'t Tracer, index: u32) -> Option<Self> {
-        let instance = &tracer.instances[index as usize];
-        let group = &tracer.groups[instance.group as usize];
-        Some(Self {
-            way: Way {
-                group: instance.group,
-                instance: index,
-                entry: 0.0,
-            },
-            instance,
-            bounds: &tracer.instance_bounds[index as usize],
-            group,
-            tree: group.only_tree()?,
-        })
-    }
-
-    /// As the walk through the world's tree would come to it; `None` where it would pass by.
-    #[inline(always)]
-    fn start(&self, ray: &Ray, best: Best) -> Option<Start> {
-        let entry = RayBoxes::new(ray).entry(self.bounds, best.t)?;
-        is_sound(ray).then(|| Start {
-            ray: to_local(&self.instance.to_world, ray),
-            instance: self.way.instance,
-            entry,
-            part: self.group.tree_at(ray.time).1,
-            best,
-        })
-    }
-}
-
 /// Rays that walk one group's tree together.
 struct Party<'w, 't, 'r, L: ?Sized, const ANY: bool> {
     walk: &'w mut Walk<'t>,
     /// Of the tree in which they begin.
     way: Way,
-    /// If that is not where they are.
-    door: Option<Door<'t>>,
+    /// If that is not the world's.
+    lone: Option<Lone<'t>>,
     rays: &'r [Ray],
     ledger: &'r mut L,
 }
@@ -394,7 +355,7 @@ impl<'t, L: Ledger + ?Sized, const ANY: bool> Party<'_, 't, '_, L, ANY> {
     /// Meets a primitive that is no triangle.
     #[inline(never)]
     fn primitive(&mut self, visit: &Visit, way: Way, item: &Item) -> Met<'t> {
-        let from = if visit.instance == self.way.instance && self.door.is_none() {
+        let from = if visit.instance == self.way.instance && self.lone.is_none() {
             self.rays[visit.ray]
         } else {
             let Instance { to_world, .. } = &self.walk.tracer.instances[visit.instance as usize];
@@ -424,13 +385,28 @@ impl<'t, L: Ledger + ?Sized, const ANY: bool> Walker<'t> for Party<'_, 't, '_, L
 
     #[inline(always)]
     fn begins_inside(&self) -> bool {
-        self.door.is_some()
+        self.lone.is_some()
     }
 
     #[inline(always)]
-    fn start_inside(&self, ray: usize) -> Option<Start> {
-        let best = self.best(&self.ledger.hit(ray), self.way.instance);
-        self.door.as_ref()?.start(&self.rays[ray], best)
+    fn start_inside(&mut self, ray: usize) -> Option<Start> {
+        let lone = self.lone.as_mut()?;
+        if !lone.has(ray) {
+            let rays = &self.rays[ray..];
+            let mut limits = [0.0; MAX_LANES];
+            for (lane, limit) in limits.iter_mut().enumerate().take(rays.len()) {
+                *limit = self.ledger.hit(ray + lane).t;
+            }
+            lone.prepare(ray, rays, &limits);
+        }
+        let (local, entry) = lone.ray(ray, &self.rays[ray])?;
+        Some(Start {
+            ray: local,
+            instance: self.way.instance,
+            entry,
+            part: lone.part(local.time),
+            best: self.best(&self.ledger.hit(ray), self.way.instance),
+        })
     }
 
     #[inline(always)]

@@ -27,6 +27,7 @@ mod x86;
 use std::fmt::Debug;
 use std::ops::{Add, BitAnd, BitOr, BitXor, Div, Index, IndexMut, Mul, Neg, Not, Sub};
 
+use crate::math::moving;
 pub use divisor::Divisor;
 pub use elementary::{
     acos, atan2, erf, erf_inverse, exp, ln, ln_bessel_i0, pow, sin_cos, sin_cos_turns,
@@ -409,6 +410,28 @@ pub trait Doubles:
     fn narrow(self) -> Self::Float;
     /// The nearest integers, the even one of two as near; within ±2³¹.
     fn to_nearest(self) -> Self::Int;
+}
+
+impl<D: Doubles<Mask: Mask>> moving::Real for D {
+    type Mask = <D as Doubles>::Mask;
+
+    #[inline(always)]
+    fn splat(value: f64) -> Self {
+        Doubles::splat(value)
+    }
+    #[inline(always)]
+    fn lt(self, other: Self) -> <D as Doubles>::Mask {
+        Doubles::lt(self, other)
+    }
+    #[inline(always)]
+    fn any_within(self, first: f64, end: f64) -> bool {
+        let (first, end) = (Doubles::splat(first), Doubles::splat(end));
+        (Doubles::lt(self, end) & !Doubles::lt(self, first)).any()
+    }
+    #[inline(always)]
+    fn select(mask: <D as Doubles>::Mask, yes: Self, no: Self) -> Self {
+        Doubles::select(mask, yes, no)
+    }
 }
 
 #[cfg(test)]

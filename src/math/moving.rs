@@ -5,11 +5,43 @@
 
 use std::f64::consts::PI;
 use std::fmt;
+use std::ops::{Add, Div, Mul, Neg, Sub};
 use std::sync::Arc;
 
 use glam::{Affine3, DAffine3, DMat3, DMat4, DQuat, DVec3, Vec3};
 
 use super::Transform;
+
+/// Numbers of double precision: one, or one for each of many times.
+pub trait Real:
+    Copy
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+{
+    /// As many answers.
+    type Mask: Copy;
+
+    /// The same number everywhere.
+    fn splat(value: f64) -> Self;
+    /// Where it is less.
+    fn lt(self, other: Self) -> Self::Mask;
+    /// Whether any is `first` or more, and less than `end`.
+    fn any_within(self, first: f64, end: f64) -> bool;
+    /// `yes` where the mask is set, else `no`.
+    fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
+}
+
+/// An affine map: its linear part's columns, and its translation.
+#[derive(Clone, Copy, Debug)]
+pub struct Affine<D> {
+    /// Where the axes go.
+    pub axes: [[D; 3]; 3],
+    /// Where the origin goes.
+    pub translation: [D; 3],
+}
 
 /// A transform at every time.
 #[derive(Clone, Debug)]
@@ -71,12 +103,12 @@ pub struct Unscaled {
 
 /// Parts of a transform at a time.
 #[derive(Clone, Copy, Debug)]
-struct Placed {
-    /// The inverse rotation, which is the transpose.
-    unturned: DMat3,
-    scale: DVec3,
-    shrink: DVec3,
-    translation: DVec3,
+struct Placed<D> {
+    /// The inverse rotation, which is the transpose, column by column.
+    unturned: [[D; 3]; 3],
+    scale: [D; 3],
+    shrink: [D; 3],
+    translation: [D; 3],
 }
 
 /// A transform that neither shears nor flattens, in parts: x ↦ rotation·(scale·x) + translation.
@@ -220,19 +252,93 @@ const fn series(shift: f64) -> [f64; 10] {
 
 /// The sum of a series, in parts that do not wait for each other.
 #[inline(always)]
-fn sum(c: &[f64; 10], y: f64) -> f64 {
+fn sum<D: Real>(c: &[f64; 10], y: D) -> D {
     let y2 = y * y;
     let y4 = y2 * y2;
-    let first = (c[0] + c[1] * y) + (c[2] + c[3] * y) * y2;
-    let next = (c[4] + c[5] * y) + (c[6] + c[7] * y) * y2;
-    first + (next + (c[8] + c[9] * y) * y4) * y4
+    let first = pair(c, 0, y) + pair(c, 2, y) * y2;
+    let next = pair(c, 4, y) + pair(c, 6, y) * y2;
+    first + (next + pair(c, 8, y) * y4) * y4
+}
+
+#[inline(always)]
+fn pair<D: Real>(c: &[f64; 10], i: usize, y: D) -> D {
+    D::splat(c[i]) + D::splat(c[i + 1]) * y
 }
 
 /// Cosine and sine of x in [-π/2, π/2], to within 10⁻¹⁴: the same bits on every machine, and sooner than from its library.
 #[inline(always)]
-fn cos_sin(x: f64) -> [f64; 2] {
+fn cos_sin<D: Real>(x: D) -> [D; 2] {
     let y = x * x;
     [sum(&COSINE, y), sum(&SINE, y) * x]
+}
+
+/// The same vector everywhere.
+#[inline(always)]
+fn all<D: Real>(v: DVec3) -> [D; 3] {
+    [D::splat(v.x), D::splat(v.y), D::splat(v.z)]
+}
+
+/// a + b·s
+#[inline(always)]
+fn add_scaled<D: Real>(a: [D; 3], b: [D; 3], s: D) -> [D; 3] {
+    [a[0] + b[0] * s, a[1] + b[1] * s, a[2] + b[2] * s]
+}
+
+#[inline(always)]
+fn scaled<D: Real>(v: [D; 3], s: D) -> [D; 3] {
+    [v[0] * s, v[1] * s, v[2] * s]
+}
+
+impl<D: Real> Affine<D> {
+    /// The same map everywhere.
+    #[inline(always)]
+    fn all(map: &DAffine3) -> Self {
+        let m = &map.matrix3;
+        Self {
+            axes: [all(m.x_axis), all(m.y_axis), all(m.z_axis)],
+            translation: all(map.translation),
+        }
+    }
+
+    /// A direction's image.
+    #[inline(always)]
+    fn vector(&self, v: [D; 3]) -> [D; 3] {
+        let [x, y, z] = self.axes;
+        add_scaled(add_scaled(scaled(x, v[0]), y, v[1]), z, v[2])
+    }
+
+    /// `self` after `first`.
+    #[inline(always)]
+    fn after(&self, first: &Self) -> Self {
+        let ([x, y, z], o) = (first.axes, self.vector(first.translation));
+        let t = self.translation;
+        Self {
+            axes: [self.vector(x), self.vector(y), self.vector(z)],
+            translation: [o[0] + t[0], o[1] + t[1], o[2] + t[2]],
+        }
+    }
+
+    /// `yes` where the mask is set, else `no`.
+    #[inline(always)]
+    fn select(mask: D::Mask, yes: &Self, no: &Self) -> Self {
+        let mut map = *no;
+        for i in 0..3 {
+            map.translation[i] = D::select(mask, yes.translation[i], no.translation[i]);
+            for j in 0..3 {
+                map.axes[i][j] = D::select(mask, yes.axes[i][j], no.axes[i][j]);
+            }
+        }
+        map
+    }
+}
+
+impl From<Affine<f64>> for DAffine3 {
+    fn from(map: Affine<f64>) -> Self {
+        Self {
+            matrix3: DMat3::from_cols_array_2d(&map.axes),
+            translation: map.translation.into(),
+        }
+    }
 }
 
 impl Turn {
@@ -262,14 +368,16 @@ impl Turn {
 
     /// The inverse rotation a part s of the way along.
     #[inline(always)]
-    fn back(&self, s: f64) -> DMat3 {
-        let [cos, sin] = cos_sin(self.half * (2.0 * s - 1.0));
+    fn back<D: Real>(&self, s: D) -> [[D; 3]; 3] {
+        let x = D::splat(self.half) * (D::splat(2.0) * s - D::splat(1.0));
+        let [cos, sin] = cos_sin(x);
         let [stays, along, across] = &self.parts;
-        DMat3::from_cols(
-            stays.x_axis + along.x_axis * cos + across.x_axis * sin,
-            stays.y_axis + along.y_axis * cos + across.y_axis * sin,
-            stays.z_axis + along.z_axis * cos + across.z_axis * sin,
-        )
+        let mut columns = [[s; 3]; 3];
+        for (i, to) in columns.iter_mut().enumerate() {
+            let goes = add_scaled(all(stays.col(i)), all(along.col(i)), cos);
+            *to = add_scaled(goes, all(across.col(i)), sin);
+        }
+        columns
     }
 }
 
@@ -298,41 +406,70 @@ impl Segment {
         from.abs().max((from + course).abs())
     }
 
+    /// The part of its time that has passed, in [0, 1].
+    #[inline(always)]
+    fn part<D: Real>(&self, time: D) -> D {
+        let s = (time - D::splat(self.start)) * D::splat(self.rate);
+        let (zero, one) = (D::splat(0.0), D::splat(1.0));
+        // What is no number, between times that are next to each other, becomes 0.
+        D::select(zero.lt(s), D::select(s.lt(one), s, one), zero)
+    }
+
     /// A part s of the way along.
     #[inline(always)]
-    fn placed(&self, s: f64) -> Placed {
-        let scale = self.scale[0] + self.scale[1] * s;
+    fn placed<D: Real>(&self, s: D) -> Placed<D> {
+        let scale = add_scaled(all(self.scale[0]), all(self.scale[1]), s);
+        let one = D::splat(1.0);
         Placed {
             unturned: self.turn.back(s),
             scale,
-            shrink: self.shrink.unwrap_or_else(|| scale.recip()),
-            translation: self.translation[0] + self.translation[1] * s,
+            shrink: match self.shrink {
+                Some(shrink) => all(shrink),
+                None => [one / scale[0], one / scale[1], one / scale[2]],
+            },
+            translation: add_scaled(all(self.translation[0]), all(self.translation[1]), s),
+        }
+    }
+
+    /// The way back at times.
+    #[inline(always)]
+    fn back<D: Real>(&self, times: D) -> Affine<D> {
+        self.placed(self.part(times)).inverse()
+    }
+}
+
+impl Placed<f64> {
+    fn forward(&self) -> DAffine3 {
+        let turned = DMat3::from_cols_array_2d(&self.unturned).transpose();
+        let s = self.scale;
+        DAffine3 {
+            matrix3: DMat3::from_cols(
+                turned.x_axis * s[0],
+                turned.y_axis * s[1],
+                turned.z_axis * s[2],
+            ),
+            translation: self.translation.into(),
         }
     }
 }
 
-impl Placed {
-    fn forward(&self) -> DAffine3 {
-        let turned = self.unturned.transpose();
-        let (s, translation) = (self.scale, self.translation);
-        DAffine3 {
-            matrix3: DMat3::from_cols(
-                turned.x_axis * s.x,
-                turned.y_axis * s.y,
-                turned.z_axis * s.z,
-            ),
-            translation,
-        }
-    }
-
+impl<D: Real> Placed<D> {
     /// The way back, without inverting a matrix.
     #[inline(always)]
-    fn inverse(&self) -> DAffine3 {
-        let (m, r) = (&self.unturned, self.shrink);
-        let matrix3 = DMat3::from_cols(m.x_axis * r, m.y_axis * r, m.z_axis * r);
-        DAffine3 {
-            matrix3,
-            translation: -(matrix3 * self.translation),
+    fn inverse(&self) -> Affine<D> {
+        let ([x, y, z], [p, q, r]) = (self.unturned, self.shrink);
+        let back = Affine {
+            axes: [
+                [x[0] * p, x[1] * q, x[2] * r],
+                [y[0] * p, y[1] * q, y[2] * r],
+                [z[0] * p, z[1] * q, z[2] * r],
+            ],
+            translation: self.translation,
+        };
+        let [x, y, z] = back.vector(self.translation);
+        Affine {
+            translation: [-x, -y, -z],
+            ..back
         }
     }
 }
@@ -369,25 +506,36 @@ impl Track {
         })
     }
 
-    /// The segment in which `time` lies, and the part of it that has passed, in [0, 1].
+    /// The segment in which `time` lies.
     #[inline(always)]
-    fn place(&self, time: f64) -> (usize, f64) {
-        let key = self.segments[1..].partition_point(|next| next.start <= time);
-        let Segment { start, rate, .. } = self.segments[key];
-        let s = (time - start) * rate;
-        // What is no number, between times that are next to each other, becomes 0.
-        (key, if s > 0.0 { s.min(1.0) } else { 0.0 })
+    fn key(&self, time: f64) -> usize {
+        self.segments[1..].partition_point(|next| next.start <= time)
     }
 
-    #[inline(always)]
-    fn placed(&self, (key, s): (usize, f64)) -> Placed {
+    /// The segment in which `time` lies, and the part of it that has passed, in [0, 1].
+    fn place(&self, time: f64) -> (usize, f64) {
+        let key = self.key(time);
+        (key, self.segments[key].part(time))
+    }
+
+    fn placed(&self, (key, s): (usize, f64)) -> Placed<f64> {
         self.segments[key].placed(s)
     }
 
-    /// The way back at a time.
+    /// The way back at times, of which `first` is the first and `last` the last.
     #[inline(always)]
-    fn back(&self, time: f64) -> DAffine3 {
-        self.placed(self.place(time)).inverse()
+    fn back<D: Real>(&self, times: D, [first, last]: [f64; 2]) -> Affine<D> {
+        let (first, last) = (self.key(first), self.key(last));
+        let mut found = self.segments[last].back(times);
+        for key in (first..last).rev() {
+            let (segment, end) = (&self.segments[key], self.segments[key + 1].start);
+            // Before the first keyframe it is as there.
+            if key == first || times.any_within(segment.start, end) {
+                let before = times.lt(D::splat(end));
+                found = Affine::select(before, &segment.back(times), &found);
+            }
+        }
+        found
     }
 
     /// A box around a box's image at all times of an interval. Between two times that are a part h of an arc apart, a
@@ -443,6 +591,15 @@ impl Link {
             inverse: forward.inverse(),
         }
     }
+
+    /// The way back, as [`Track::back`].
+    #[inline(always)]
+    fn back<D: Real>(&self, times: D, range: [f64; 2]) -> Affine<D> {
+        match self {
+            Self::Fixed { inverse, .. } => Affine::all(inverse),
+            Self::Track(track) => track.back(times, range),
+        }
+    }
 }
 
 impl Chain {
@@ -469,7 +626,7 @@ impl Chain {
             Link::Fixed { forward, inverse } => (*forward, *inverse),
             Link::Track(track) => {
                 let placed = track.placed(track.place(time));
-                (placed.forward(), placed.inverse())
+                (placed.forward(), placed.inverse().into())
             }
         });
         let outermost = links
@@ -481,22 +638,21 @@ impl Chain {
         Transform::of_parts(&forward, &inverse)
     }
 
+    /// [`Moving::back_at`].
+    #[inline(always)]
+    fn back_at<D: Real>(&self, times: D, range: [f64; 2]) -> Affine<D> {
+        let mut found = self.links[0].back(times, range);
+        for inner in &self.links[1..] {
+            found = inner.back(times, range).after(&found);
+        }
+        found
+    }
+
     /// [`Moving::back`].
     #[inline(never)]
     fn back(&self, time: f32) -> Affine3 {
         let time = f64::from(time);
-        let back = match &self.links[..] {
-            [Link::Track(track)] => track.back(time),
-            links => {
-                let inverses = links.iter().map(|link| match link {
-                    Link::Fixed { inverse, .. } => *inverse,
-                    Link::Track(track) => track.back(time),
-                });
-                let back = inverses.reduce(|outer, inner| inner * outer);
-                back.unwrap_or(DAffine3::IDENTITY)
-            }
-        };
-        back.as_affine3()
+        DAffine3::from(self.back_at(time, [time; 2])).as_affine3()
     }
 }
 
@@ -603,6 +759,16 @@ impl Moving {
         match self {
             Self::Still(transform) => *transform.back(),
             Self::Keyed(chain) => chain.back(time),
+        }
+    }
+
+    /// The same at many times, of which `first` is the first and `last` the last; to the bit, once it is rounded to single
+    /// precision.
+    #[inline(always)]
+    pub fn back_at<D: Real>(&self, times: D, first: f32, last: f32) -> Affine<D> {
+        match self {
+            Self::Still(transform) => Affine::all(&transform.back().as_daffine3()),
+            Self::Keyed(chain) => chain.back_at(times, [first, last].map(f64::from)),
         }
     }
 

@@ -278,7 +278,7 @@ fn found<'t, W: Walker<'t>, const ANY: bool, const LATER: bool>(walker: &mut W, 
 /// The processor has the instructions of `L`.
 #[inline(always)]
 unsafe fn begin<'t, L: Lanes, W: Walker<'t>, const LATER: bool>(
-    walker: &W,
+    walker: &mut W,
     (next, count): (&mut usize, usize),
     ray: &mut State,
     tree: &Tree,

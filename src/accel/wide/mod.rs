@@ -52,7 +52,7 @@ pub(super) trait Walker<'t> {
     /// Whether the walk begins in the tree of an instance, for which [`Needs::later`] must be set.
     fn begins_inside(&self) -> bool;
     /// There, the same in the instance's space; `None` where the ray passes the instance by.
-    fn start_inside(&self, ray: usize) -> Option<Start>;
+    fn start_inside(&mut self, ray: usize) -> Option<Start>;
     /// Asks for the memory ahead of an item that is no triangle, which will be met; of the tree of that instance, or of
     /// the one in which the walk began.
     fn fetch(&self, instance: u32, item: u32);

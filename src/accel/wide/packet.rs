@@ -12,7 +12,7 @@ use super::node::{BLOCK, BLOCK_INDEX, DONE, LEAF, OTHER, OTHER_INDEX, WIDTH, tri
 use super::state::{Best, Place, Visit};
 use super::{Met, Tree, Walker};
 use crate::accel::Counts;
-use crate::accel::boxes::{LOST, RayBoxes, SMALLEST, WIDEN};
+use crate::accel::boxes::{LaneBoxes, RayBoxes};
 use crate::accel::triangle::{AXES, Shear};
 use crate::interaction::{Hit, Ray};
 use crate::lanes::{Doubles as _, Ints as _, Lanes, Mask as _, Task, Vec3};
@@ -28,14 +28,11 @@ pub(super) struct Packets<'a, 't, W, const ANY: bool> {
     pub(super) counts: &'a mut Counts,
 }
 
-/// Rays that go down together; fields as in [`RayBoxes`] and [`Shear`].
+/// Rays that go down together; fields as in [`Shear`].
 struct Packet<F: Lanes> {
     origin: Vec3<F>,
     direction: Vec3<F>,
-    inverse: Vec3<F>,
-    entering: Vec3<F>,
-    leaving: Vec3<F>,
-    backward: [F::Mask; 3],
+    boxes: LaneBoxes<F>,
     /// The octant of the directions, a bit an axis, where all have the same.
     octant: Option<usize>,
     /// Along the shear's axes.
@@ -73,16 +70,8 @@ fn along<F: Lanes>(point: glam::Vec3, [x, y, z]: [usize; 3]) -> Vec3<F> {
 impl<F: Lanes> Packet<F> {
     #[inline(always)]
     fn new(origin: Vec3<F>, direction: Vec3<F>) -> Self {
-        let (zero, one) = (F::zero(), F::one());
-        let smallest = F::splat(SMALLEST);
+        let zero = F::zero();
         let (x, y, z) = (direction.x, direction.y, direction.z);
-        let inverse = Vec3::new(
-            one / F::select(x.abs().lt(smallest), smallest.copysign(x), x),
-            one / F::select(y.abs().lt(smallest), smallest.copysign(y), y),
-            one / F::select(z.abs().lt(smallest), smallest.copysign(z), z),
-        );
-        let middle = -origin.times(inverse);
-        let lost = middle.abs() * F::splat(LOST);
         let (a, b, c) = (x.abs(), y.abs(), z.abs());
         let (ab, ac, bc) = (a.gt(b), a.gt(c), b.gt(c));
         let (is_x, is_y) = (ab & ac, !ab & bc);
@@ -110,10 +99,7 @@ impl<F: Lanes> Packet<F> {
         Self {
             origin,
             direction,
-            inverse,
-            entering: middle - lost,
-            leaving: middle + lost,
-            backward: [inverse.x.lt(zero), inverse.y.lt(zero), inverse.z.lt(zero)],
+            boxes: LaneBoxes::new(origin, direction),
             sheared_origin,
             shear,
             ways: [
@@ -131,56 +117,11 @@ impl<F: Lanes> Packet<F> {
         }
     }
 
-    /// The octant of the rays with these bits, where all have the same.
-    #[inline(always)]
-    fn common_octant(&self, rays: u32) -> Option<usize> {
-        let mut octant = 0;
-        for (axis, backward) in self.backward.iter().enumerate() {
-            let backward = backward.to_bits() & rays;
-            if backward == rays {
-                octant |= 1 << axis;
-            } else if backward != 0 {
-                return None;
-            }
-        }
-        Some(octant)
-    }
-
     /// The component `axes[0]` of those that go mostly along x, `axes[1]` along y, `axes[2]` along z.
     #[inline(always)]
     fn pick(is_x: F::Mask, is_y: F::Mask, v: Vec3<F>, axes: [usize; 3]) -> F {
         let v = [v.x, v.y, v.z];
         F::select(is_x, v[axes[0]], F::select(is_y, v[axes[1]], v[axes[2]]))
-    }
-
-    /// Where the rays enter a box, and where they leave it, widened; slabs as in a node.
-    #[inline(always)]
-    fn enter(&self, slabs: [f32; 6]) -> [F; 2] {
-        let mut first = [F::zero(); 3];
-        let mut last = [F::zero(); 3];
-        if let Some(octant) = self.octant {
-            for axis in 0..3 {
-                let back = octant >> axis & 1;
-                first[axis] = F::splat(slabs[2 * axis + back]);
-                last[axis] = F::splat(slabs[2 * axis + 1 - back]);
-            }
-        } else {
-            for axis in 0..3 {
-                let (low, high) = (F::splat(slabs[2 * axis]), F::splat(slabs[2 * axis + 1]));
-                first[axis] = F::select(self.backward[axis], high, low);
-                last[axis] = F::select(self.backward[axis], low, high);
-            }
-        }
-        let (e, l, i) = (self.entering, self.leaving, self.inverse);
-        let near = first[0]
-            .mul_add(i.x, e.x)
-            .max(first[1].mul_add(i.y, e.y))
-            .max(first[2].mul_add(i.z, e.z));
-        let far = last[0]
-            .mul_add(i.x, l.x)
-            .min(last[1].mul_add(i.y, l.y))
-            .min(last[2].mul_add(i.z, l.z));
-        [near.max(F::zero()), far * F::splat(WIDEN)]
     }
 
     /// Edge functions of a triangle whose corners are given along the shear's axes.
@@ -269,7 +210,7 @@ impl<'t, W: Walker<'t>, const ANY: bool> Packets<'_, 't, W, ANY> {
         packet.limit = F::load(&limit);
         packet.id = F::load(&ids).to_bits();
         packet.place = F::load(&places).to_bits();
-        packet.octant = packet.common_octant(sound);
+        packet.octant = packet.boxes.common_octant(sound);
         self.walk(&mut packet, first, F::Mask::from_bits(sound), octant, stack);
         self.report(&packet, first, count);
     }
@@ -309,7 +250,7 @@ impl<'t, W: Walker<'t>, const ANY: bool> Packets<'_, 't, W, ANY> {
                         s[4][child],
                         s[5][child],
                     ];
-                    let [near, far] = packet.enter(slabs);
+                    let [near, far] = packet.boxes.enter(slabs, packet.octant);
                     let mask = mask & near.le(far) & near.le(packet.limit);
                     if mask.any() {
                         stack[top] = Stop { near, name, mask };
@@ -373,7 +314,7 @@ impl<'t, W: Walker<'t>, const ANY: bool> Packets<'_, 't, W, ANY> {
                 }
                 let (low, high) = (a.min(b).min(c), a.max(b).max(c));
                 let slabs = [low.x, high.x, low.y, high.y, low.z, high.z];
-                let [own, far] = packet.enter(slabs);
+                let [own, far] = packet.boxes.enter(slabs, packet.octant);
                 let t = packet.distance([a, b, c].map(glam::Vec3::as_dvec3));
                 let there = inside & own.le(far) & zero.lt(t);
                 // Never before its own box: so no order of walking can miss it.
