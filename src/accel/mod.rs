@@ -49,7 +49,7 @@ impl Counts {
 /// What is known of the rays of a batch. It changes no hit, but how they are found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Order {
-    /// Nothing: each is walked by itself.
+    /// Nothing: each is walked by itself, unless the tree is small.
     #[default]
     Any,
     /// Those that follow one another go much the same way, as a camera's do: they are walked in packets.
@@ -202,6 +202,8 @@ pub struct Tracer {
     deforms: bool,
     /// Whether any tree has items that are no triangles.
     has_others: bool,
+    /// Whether the world's tree is so small that rays are faster in packets, whatever way they go.
+    is_small: bool,
     /// Whether the trees do not fit into the caches near a core.
     is_large: bool,
     method: Method,
@@ -264,6 +266,7 @@ impl Tracer {
             inner_levels: inner.max().unwrap_or(0),
             deforms: groups.iter().any(Group::deforms),
             has_others: groups.iter().any(|group| !group.items().is_empty()),
+            is_small: groups[0].tree().node_count() <= SMALL,
             is_large: groups.iter().map(Group::bytes).sum::<usize>() > CACHED,
             groups,
             method: recipe.method,
@@ -390,6 +393,10 @@ impl Tracer {
         self.groups.iter().map(Group::bytes).sum()
     }
 }
+
+/// Trees of up to so many nodes are walked in packets by rays that go any way. From about sixteen nodes of triangles on, and
+/// fifty of spheres, a walk for each ray is faster.
+const SMALL: usize = 12;
 
 /// Trees up to this size are in the caches nearest to a core, as far as counts: there asking for memory ahead
 /// costs a tenth.

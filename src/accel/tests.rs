@@ -51,7 +51,10 @@ pub(super) fn all(shapes: &[Arc<Geometry>], groups: &[u32], instances: &[Instanc
             kernel,
             ..Recipe::default()
         };
-        Tracer::new(shapes.to_vec(), groups, instances.to_vec(), recipe)
+        let mut tracer = Tracer::new(shapes.to_vec(), groups, instances.to_vec(), recipe);
+        // So that small scenes try single rays too; packets are asked for by their order.
+        tracer.is_small = false;
+        tracer
     };
     let walked = Kernel::all().into_iter();
     let trees = walked.map(|kernel| tracer(Method::Tree, kernel));
@@ -207,6 +210,61 @@ fn surfaces_with_equations_are_found_alike_in_the_world_and_in_instances() {
     for tracer in &tracers {
         let Bounds { min, max } = tracer.bounds();
         assert!((max - min).max_element() < 3.0, "the plane is left out");
+    }
+}
+
+#[test]
+fn spheres_that_touch_and_coincide_are_found_alike_among_triangles() {
+    let sphere = |center: Vec3, radius: f32| {
+        let text = format!(
+            r#"<scene version="3.0.0"><shape type="sphere"><float name="radius" value="{radius}"/>
+            <point name="center" x="{}" y="{}" z="{}"/></shape></scene>"#,
+            center.x, center.y, center.z
+        );
+        let options = Options::default();
+        let scene = Description::parse(&text, Path::new("test.xml"), &options).unwrap();
+        let children = scene.root().children(Kind::Shape);
+        Arc::new(shape::build(&children[0]).unwrap().geometry)
+    };
+    let scattered =
+        (0..40).map(|i| sphere(direction(50, i) * uniform(51, i), 0.3 * uniform(52, i)));
+    let mut shapes: Vec<_> = scattered.collect();
+    // Ties of spheres with one another and with triangles.
+    shapes.extend([
+        sphere(Vec3::ZERO, 0.5),
+        sphere(Vec3::ZERO, 0.5),
+        sphere(Vec3::new(1.0, 0.0, 0.0), 0.5),
+        sphere(Vec3::new(0.0, 0.0, 1e4), 1e4),
+        sphere(Vec3::new(0.3, 0.0, 0.0), 1e-6),
+    ]);
+    let meshes = [mesh::rectangle(), mesh::cube(), mesh::bumpy_sphere(2, 5)];
+    shapes.extend(meshes.map(|m| Arc::new(Geometry::Mesh(TriangleMesh::new(m)))));
+    let tracers = all(&shapes, &vec![0; shapes.len()], &[]);
+    let targets = [Vec3::ZERO, Vec3::X * 0.5, Vec3::new(0.3, 0.0, 0.0)];
+    assert!(agree(&tracers, &rays(20_000, &targets)) > 15_000);
+    assert!(agree(&tracers, &odd_rays()) > 800);
+}
+
+#[test]
+fn packets_in_small_trees_visit_what_single_rays_visit() {
+    for (subdivisions, is_small) in [(1, true), (5, false)] {
+        let mesh = mesh::bumpy_sphere(subdivisions, 7);
+        let rays = rays(1000, &mesh.positions);
+        let shapes = vec![Arc::new(Geometry::Mesh(TriangleMesh::new(mesh)))];
+        let mut tracer = Tracer::new(shapes, &[0], Vec::new(), Method::Tree);
+        assert_eq!(tracer.is_small, is_small);
+        if !is_small {
+            continue;
+        }
+        let [single, packets] = [false, true].map(|is_small| {
+            tracer.is_small = is_small;
+            let (mut hits, mut blocked) = (Vec::new(), Vec::new());
+            let mut counts = [Counts::default(); 2];
+            tracer.closest(&rays, Order::Any, &mut hits, &mut counts[0]);
+            tracer.occluded(&rays, Order::Any, &mut blocked, &mut counts[1]);
+            (hits, blocked, counts)
+        });
+        assert_eq!(single, packets);
     }
 }
 

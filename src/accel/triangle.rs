@@ -94,11 +94,12 @@ impl Shear {
         edges.iter().all(|e| *e >= 0.0) != edges.iter().all(|e| *e <= 0.0)
     }
 
-    /// The second and third barycentric coordinates.
+    /// The second and third barycentric coordinates, which are the same whatever sign the edge functions have.
     #[inline(always)]
     pub(super) fn barycentric([u, v, w]: [f32; 3]) -> (f32, f32) {
         let inverse = 1.0 / (u + v + w);
-        (v * inverse, w * inverse)
+        // What is added takes the sign of a zero.
+        (v * inverse + 0.0, w * inverse + 0.0)
     }
 
     /// Where the ray meets the triangle's plane.

@@ -5,7 +5,7 @@ use std::cmp::Ordering;
 
 use crate::interaction::{Hit, Ray};
 use crate::lanes::MAX_LANES;
-use crate::shape::{Bounds, Geometry};
+use crate::shape::{Bounds, Geometry, Sphere};
 
 use super::boxes::RayBoxes;
 use super::group::Item;
@@ -86,8 +86,9 @@ impl<'t> Walk<'t> {
             ledger,
         };
         let (kernel, count) = (tracer.kernel, rays.len());
-        if order == Order::Coherent && !group.has_instances() {
-            tree.packets::<_, ANY>(kernel, &mut party, rays, &mut counts);
+        let in_packets = order == Order::Coherent || (tracer.is_small && way.instance == Hit::NONE);
+        if in_packets && !group.has_instances() {
+            tree.packets::<_, ANY>(kernel, &mut party, (rays, order), &mut counts);
             return self.counts.add(&counts);
         }
         let needs = Needs {
@@ -290,7 +291,7 @@ impl<'t, L: Ledger + ?Sized, const ANY: bool> Party<'_, 't, '_, L, ANY> {
         }
     }
 
-    /// The triangle that the tree found.
+    /// The primitive that the tree found.
     fn triangle(&self, best: Best, instance: u32, (u, v): (f32, f32)) -> Hit {
         let Item { shape, index } = self.walk.tracer.shapes.numbered(best.id);
         Hit {
@@ -427,6 +428,19 @@ impl<'t, L: Ledger + ?Sized, const ANY: bool> Walker<'t> for Party<'_, 't, '_, L
         match item.as_instance() {
             Some(instance) => self.instance(visit, instance),
             None => self.primitive(visit, way, item),
+        }
+    }
+
+    #[inline(always)]
+    fn sphere(&self, item: u32) -> Option<(&'t Sphere, u32)> {
+        let tracer = self.walk.tracer;
+        let item = tracer.groups[self.way.group as usize].items()[item as usize];
+        if item.as_instance().is_some() {
+            return None;
+        }
+        match tracer.shapes.get(item.shape) {
+            Geometry::Sphere(sphere) => Some((sphere, tracer.shapes.number(item))),
+            _ => None,
         }
     }
 

@@ -16,7 +16,7 @@ use crate::description::Properties;
 use crate::description::declared::{Plugin, float, vector};
 use crate::error::Result;
 use crate::interaction::{Hit, Interaction, Ray, offset};
-use crate::lanes::{self, Lanes, Mask as _, warp};
+use crate::lanes::{self, Doubles as _, Lanes, Mask as _, warp};
 use crate::math::Frame;
 
 /// A sphere in world space.
@@ -142,6 +142,42 @@ impl Sphere {
 }
 
 impl Sphere {
+    /// How far along rays the first hit is that is not beyond `t_max`; not a number where there is none.
+    #[inline(always)]
+    pub(crate) fn meet<F: Lanes>(
+        &self,
+        origin: lanes::Vec3<F>,
+        direction: lanes::Vec3<F>,
+        t_max: F,
+    ) -> F {
+        let (none, center) = (F::Double::splat(0.0), self.center.as_dvec3());
+        let ox = origin.x.widen() - F::Double::splat(center.x);
+        let oy = origin.y.widen() - F::Double::splat(center.y);
+        let oz = origin.z.widen() - F::Double::splat(center.z);
+        let dx = direction.x.widen();
+        let dy = direction.y.widen();
+        let dz = direction.z.widen();
+        let (a, b) = (dx * dx + dy * dy + dz * dz, ox * dx + oy * dy + oz * dz);
+        let r2 = F::Double::splat(f64::from(self.radius).powi(2));
+        // The distance of the line from the centre, without the cancellation of b² − ac.
+        let nearest = b / a;
+        let (nx, ny, nz) = (ox - dx * nearest, oy - dy * nearest, oz - dz * nearest);
+        let discriminant = a * (r2 - (nx * nx + ny * ny + nz * nz));
+        let meets = !discriminant.lt(none);
+        if !meets.any() {
+            return F::splat(f32::NAN);
+        }
+        let root = discriminant.sqrt();
+        let q = F::Double::select(b.lt(none), root, -root) - b;
+        let c = ox * ox + oy * oy + oz * oz - r2;
+        let t0 = q / a;
+        let t1 = F::Double::select(q.lt(none) | none.lt(q), c / q, t0);
+        let (near, far) = (t0.min(t1).narrow(), t0.max(t1).narrow());
+        let t = F::select(F::zero().lt(near), near, far);
+        let meets = meets & F::zero().lt(t) & t.le(t_max);
+        F::select(meets, t, F::splat(f32::NAN))
+    }
+
     /// [`Surface::sample`] in lanes.
     #[inline(always)]
     pub(super) fn sample_lanes<F: Lanes>(
@@ -201,28 +237,8 @@ impl Surface for Sphere {
     }
 
     fn intersect(&self, _primitive: u32, ray: &Ray) -> Option<(f32, f32, f32)> {
-        let (o, d) = (
-            (ray.origin.as_dvec3() - self.center.as_dvec3()),
-            ray.direction.as_dvec3(),
-        );
-        let (a, b) = (d.length_squared(), o.dot(d));
-        let r2 = f64::from(self.radius).powi(2);
-        // The distance of the line from the centre, without the cancellation of b² − ac.
-        let nearest = o - d * (b / a);
-        let discriminant = a * (r2 - nearest.length_squared());
-        if discriminant < 0.0 {
-            return None;
-        }
-        let root = discriminant.sqrt();
-        let q = if b < 0.0 { root - b } else { -root - b };
-        let c = o.length_squared() - r2;
-        let (t0, t1) = (q / a, if q == 0.0 { q / a } else { c / q });
-        let (near, far) = (t0.min(t1), t0.max(t1));
-        [near, far]
-            .into_iter()
-            .map(|t| t as f32)
-            .find(|&t| t > 0.0 && t <= ray.t_max)
-            .map(|t| (t, 0.0, 0.0))
+        let t = self.meet::<f32>(ray.origin.into(), ray.direction.into(), ray.t_max);
+        (!t.is_nan()).then_some((t, 0.0, 0.0))
     }
 
     fn interaction(&self, ray: &Ray, hit: &Hit) -> Interaction<'_> {

@@ -18,6 +18,7 @@ mod chunks;
 mod collapse;
 mod compiled;
 mod crown;
+mod directions;
 mod huge_pages;
 mod kernel;
 mod later;
@@ -35,10 +36,10 @@ use std::path::Path;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::{Build, CacheUse, Counts};
+use super::{Build, CacheUse, Counts, Order};
 use crate::interaction::Ray;
 use crate::lanes::Kernel;
-use crate::shape::Bounds;
+use crate::shape::{Bounds, Sphere};
 use huge_pages::Huge;
 use node::{Block, MovingBlock, MovingNode, Node};
 use state::Flight;
@@ -58,7 +59,9 @@ pub(super) trait Walker<'t> {
     fn fetch(&self, instance: u32, item: u32);
     /// Meets one of the items that are no triangles, of the tree that the ray is in.
     fn other(&mut self, visit: &Visit, item: u32) -> Met<'t>;
-    /// A triangle, of the world's tree or in an instance, is the best so far; with its u and v.
+    /// The sphere that one of these items is, of the tree in which the walk began, and its number in the scene.
+    fn sphere(&self, item: u32) -> Option<(&'t Sphere, u32)>;
+    /// A primitive, of the world's tree or in an instance, is the best so far; with its u and v.
     fn found(&mut self, ray: usize, instance: u32, best: Best, uv: (f32, f32));
 }
 
@@ -176,6 +179,11 @@ impl Tree {
         self.blocks.is_empty() && self.later.is_none()
     }
 
+    /// How many nodes it has.
+    pub(super) fn node_count(&self) -> usize {
+        self.nodes.len()
+    }
+
     /// Nodes on the longest way down.
     pub(super) fn levels(&self) -> usize {
         self.levels
@@ -215,14 +223,20 @@ impl Tree {
         &'t self,
         kernel: Kernel,
         walker: &mut W,
-        rays: &[Ray],
+        (rays, order): (&[Ray], Order),
         counts: &mut Counts,
     ) {
         let tree = self;
+        let sequence = match order {
+            Order::Coherent => (0..rays.len() as u32).collect(),
+            Order::Any => directions::sorted(rays),
+        };
         kernel.run(packet::Packets::<W, ANY> {
             tree,
             walker,
             rays,
+            sequence: &sequence,
+            by_octant: order == Order::Any,
             counts,
         });
     }

@@ -1,14 +1,16 @@
 //! Walking the tree with packets: as many rays as there are lanes go down together, and a box or a triangle is held
-//! against all of them. That pays for rays that go the same way, as those of a pixel do; the hits are those of the walk
-//! of single rays, to the bit.
+//! against all of them. That pays for rays that go the same way, as those of a pixel do, and for any rays in small trees; the
+//! hits are those of the walk of single rays, to the bit.
 //!
 //! Rays are walked in groups of sixteen, which are parted into as many packets as the lanes make necessary. All of a
 //! group look at children in the order that suits its first ray. So what a ray visits, and what is counted, does not
-//! depend on how many lanes there are.
+//! depend on how many lanes there are. Rays that go any way are in groups of one octant, so that each visits what it would
+//! visit by itself.
 
 use glam::DVec3;
 
-use super::node::{BLOCK, BLOCK_INDEX, DONE, LEAF, OTHER, OTHER_INDEX, WIDTH, triangles_of};
+use super::directions;
+use super::node::{BLOCK_INDEX, DONE, LEAF, OTHER, OTHER_INDEX, WIDTH, triangles_of};
 use super::state::{Best, Place, Visit};
 use super::{Met, Tree, Walker};
 use crate::accel::Counts;
@@ -25,6 +27,10 @@ pub(super) struct Packets<'a, 't, W, const ANY: bool> {
     pub(super) tree: &'t Tree,
     pub(super) walker: &'a mut W,
     pub(super) rays: &'a [Ray],
+    /// The indices of all rays in the order in which they are taken.
+    pub(super) sequence: &'a [u32],
+    /// Whether they are sorted by octant, and groups have rays of one.
+    pub(super) by_octant: bool,
     pub(super) counts: &'a mut Counts,
 }
 
@@ -35,15 +41,19 @@ struct Packet<F: Lanes> {
     boxes: LaneBoxes<F>,
     /// The octant of the directions, a bit an axis, where all have the same.
     octant: Option<usize>,
+    /// Who goes mostly along x, and who along y.
+    mostly: [F::Mask; 2],
+    /// The axis along which the rays go mostly, where all have the same.
+    axis: Option<usize>,
     /// Along the shear's axes.
     sheared_origin: Vec3<F>,
     shear: [F; 2],
-    /// Which axes: those of each ray, 0 to 5, and who has which.
-    ways: [F::Mask; 6],
     /// The best hits so far; numbers with their highest bit turned, so that they compare as if without a sign.
     limit: F,
     id: F::Int,
     place: F::Int,
+    /// The edge functions of the best.
+    edges: [F; 3],
 }
 
 /// What is still to be visited.
@@ -56,77 +66,73 @@ struct Stop<F: Lanes> {
 
 const SIGN: u32 = 1 << 31;
 
-/// The axis along which a ray mostly goes, and whether it goes backwards, as an index of [`Packet::ways`].
-fn axes_of(way: usize) -> [usize; 3] {
-    AXES[way / 2][way % 2]
-}
-
-/// A point along these axes, for all rays.
-#[inline(always)]
-fn along<F: Lanes>(point: glam::Vec3, [x, y, z]: [usize; 3]) -> Vec3<F> {
-    Vec3::new(F::splat(point[x]), F::splat(point[y]), F::splat(point[z]))
-}
-
 impl<F: Lanes> Packet<F> {
     #[inline(always)]
     fn new(origin: Vec3<F>, direction: Vec3<F>) -> Self {
-        let zero = F::zero();
-        let (x, y, z) = (direction.x, direction.y, direction.z);
-        let (a, b, c) = (x.abs(), y.abs(), z.abs());
+        let [a, b, c] = [direction.x.abs(), direction.y.abs(), direction.z.abs()];
         let (ab, ac, bc) = (a.gt(b), a.gt(c), b.gt(c));
-        let (is_x, is_y) = (ab & ac, !ab & bc);
-        let along = Self::pick(is_x, is_y, direction, [0, 1, 2]);
-        let back = along.lt(zero);
-        // The axes after z, changed round for rays that go backwards.
-        let (first, second) = (
-            Self::pick(is_x, is_y, direction, [1, 2, 0]),
-            Self::pick(is_x, is_y, direction, [2, 0, 1]),
-        );
-        let (from_first, from_second) = (
-            Self::pick(is_x, is_y, origin, [1, 2, 0]),
-            Self::pick(is_x, is_y, origin, [2, 0, 1]),
-        );
-        let sheared_origin = Vec3::new(
-            F::select(back, from_second, from_first),
-            F::select(back, from_first, from_second),
-            Self::pick(is_x, is_y, origin, [0, 1, 2]),
-        );
-        let shear = [
-            F::select(back, second, first) / along,
-            F::select(back, first, second) / along,
-        ];
-        let is_z = !is_x & !is_y;
+        let mostly = [ab & ac, !ab & bc];
+        let along = Self::turned(mostly, direction);
         Self {
             origin,
             direction,
             boxes: LaneBoxes::new(origin, direction),
-            sheared_origin,
-            shear,
-            ways: [
-                is_x & !back,
-                is_x & back,
-                is_y & !back,
-                is_y & back,
-                is_z & !back,
-                is_z & back,
-            ],
+            mostly,
+            axis: None,
+            sheared_origin: Self::turned(mostly, origin),
+            shear: [along.x / along.z, along.y / along.z],
             octant: None,
-            limit: zero,
+            limit: F::zero(),
             id: F::Int::splat(0),
             place: F::Int::splat(0),
+            edges: [F::zero(); 3],
         }
     }
 
-    /// The component `axes[0]` of those that go mostly along x, `axes[1]` along y, `axes[2]` along z.
+    /// The axis along which the rays with these bits go mostly, where all have the same.
     #[inline(always)]
-    fn pick(is_x: F::Mask, is_y: F::Mask, v: Vec3<F>, axes: [usize; 3]) -> F {
-        let v = [v.x, v.y, v.z];
-        F::select(is_x, v[axes[0]], F::select(is_y, v[axes[1]], v[axes[2]]))
+    fn common_axis(&self, rays: u32) -> Option<usize> {
+        let [is_x, is_y] = self.mostly;
+        match (is_x.to_bits() & rays, is_y.to_bits() & rays) {
+            (0, 0) => Some(2),
+            (x, _) if x == rays => Some(0),
+            (_, y) if y == rays => Some(1),
+            _ => None,
+        }
     }
 
-    /// Edge functions of a triangle whose corners are given along the shear's axes.
+    /// A vector along the shear's axes.
     #[inline(always)]
-    fn edges(&self, corners: [Vec3<F>; 3]) -> [F; 3] {
+    fn turned(mostly: [F::Mask; 2], v: Vec3<F>) -> Vec3<F> {
+        Vec3::new(
+            Self::pick(mostly, [v.y, v.z, v.x]),
+            Self::pick(mostly, [v.z, v.x, v.y]),
+            Self::pick(mostly, [v.x, v.y, v.z]),
+        )
+    }
+
+    /// The first of those that go mostly along x, the second along y, the third along z.
+    #[inline(always)]
+    fn pick([is_x, is_y]: [F::Mask; 2], [x, y, z]: [F; 3]) -> F {
+        F::select(is_x, x, F::select(is_y, y, z))
+    }
+
+    /// A point along the shear's axes.
+    #[inline(always)]
+    fn along(&self, point: glam::Vec3) -> Vec3<F> {
+        match self.axis {
+            Some(axis) => {
+                let [x, y, z] = AXES[axis][0];
+                Vec3::new(F::splat(point[x]), F::splat(point[y]), F::splat(point[z]))
+            }
+            None => Self::turned(self.mostly, Vec3::all(point)),
+        }
+    }
+
+    /// Edge functions of a triangle. Those of rays that go backwards have the other sign than [`Shear::edges`]: whether
+    /// all have the same does not depend on it.
+    #[inline(always)]
+    fn edges(&self, corners: [glam::Vec3; 3]) -> [F; 3] {
         let [a, b, c] = [
             self.planar(corners[0]),
             self.planar(corners[1]),
@@ -140,9 +146,17 @@ impl<F: Lanes> Packet<F> {
     }
 
     #[inline(always)]
-    fn planar(&self, corner: Vec3<F>) -> [F; 2] {
-        let p = corner - self.sheared_origin;
+    fn planar(&self, corner: glam::Vec3) -> [F; 2] {
+        let p = self.along(corner) - self.sheared_origin;
         [p.x - self.shear[0] * p.z, p.y - self.shear[1] * p.z]
+    }
+
+    /// The second and third barycentric coordinates of the best hits, as [`Shear::barycentric`] has them.
+    #[inline(always)]
+    fn barycentric(&self) -> [F; 2] {
+        let [u, v, w] = self.edges;
+        let inverse = F::one() / (u + v + w);
+        [v * inverse + F::zero(), w * inverse + F::zero()]
     }
 
     /// Distances to a triangle's plane, in double precision.
@@ -158,6 +172,26 @@ impl<F: Lanes> Packet<F> {
         let along = nx * d.x.widen() + ny * d.y.widen() + nz * d.z.widen();
         (above / along).narrow()
     }
+
+    /// Takes what some rays meet at these distances, if it is better than their best; whose it is then.
+    #[inline(always)]
+    fn take(
+        &mut self,
+        there: F::Mask,
+        (t, edges): (F, [F; 3]),
+        (id, place): (u32, Place),
+    ) -> F::Mask {
+        let (id, place) = (F::Int::splat(id ^ SIGN), F::Int::splat(place.0));
+        let first = t.eq(self.limit) & id.lt(self.id);
+        let better = there & (t.lt(self.limit) | first);
+        self.limit = F::select(better, t, self.limit);
+        self.id = F::Int::select(better, id, self.id);
+        self.place = F::Int::select(better, place, self.place);
+        for (best, edge) in self.edges.iter_mut().zip(edges) {
+            *best = F::select(better, edge, *best);
+        }
+        better
+    }
 }
 
 impl<'t, W: Walker<'t>, const ANY: bool> Task for Packets<'_, 't, W, ANY> {
@@ -172,20 +206,28 @@ impl<'t, W: Walker<'t>, const ANY: bool> Task for Packets<'_, 't, W, ANY> {
         };
         // Each level leaves up to seven children on the stack; the eighth is on its way down.
         let mut stack = vec![stop; (WIDTH - 1) * self.tree.levels + 2 * WIDTH];
-        for start in (0..self.rays.len()).step_by(GROUP) {
-            let end = (start + GROUP).min(self.rays.len());
-            let backward = RayBoxes::new(&self.rays[start])
-                .inverse
-                .cmplt(glam::Vec3::ZERO);
-            let octant = backward.bitmask() as usize;
+        let mut start = 0;
+        while start < self.sequence.len() {
+            let octant = directions::octant(self.ray(start));
+            let mut end = (start + GROUP).min(self.sequence.len());
+            while self.by_octant && directions::octant(self.ray(end - 1)) != octant {
+                end -= 1;
+            }
             for first in (start..end).step_by(F::WIDTH) {
                 self.packet(first, end, octant, &mut stack);
             }
+            start = end;
         }
     }
 }
 
 impl<'t, W: Walker<'t>, const ANY: bool> Packets<'_, 't, W, ANY> {
+    /// A ray by its place in the sequence.
+    #[inline(always)]
+    fn ray(&self, place: usize) -> &Ray {
+        &self.rays[self.sequence[place] as usize]
+    }
+
     /// Walks the rays from `first` on, up to `end`.
     #[inline(always)]
     fn packet<F: Lanes>(&mut self, first: usize, end: usize, octant: usize, stack: &mut [Stop<F>]) {
@@ -194,12 +236,13 @@ impl<'t, W: Walker<'t>, const ANY: bool> Packets<'_, 't, W, ANY> {
         let mut limit = F::ROW;
         let (mut sound, mut ids, mut places) = (0_u32, F::ROW, F::ROW);
         for lane in 0..count {
-            let ray = &self.rays[first + lane];
+            let index = self.sequence[first + lane] as usize;
+            let ray = &self.rays[index];
             for axis in 0..3 {
                 origin[axis][lane] = ray.origin[axis];
                 direction[axis][lane] = ray.direction[axis];
             }
-            let best = self.walker.start(first + lane).best;
+            let best = self.walker.start(index).best;
             limit[lane] = best.t;
             ids[lane] = f32::from_bits(best.id ^ SIGN);
             places[lane] = f32::from_bits(best.place.0);
@@ -211,6 +254,7 @@ impl<'t, W: Walker<'t>, const ANY: bool> Packets<'_, 't, W, ANY> {
         packet.id = F::load(&ids).to_bits();
         packet.place = F::load(&places).to_bits();
         packet.octant = packet.boxes.common_octant(sound);
+        packet.axis = packet.common_axis(sound);
         self.walk(&mut packet, first, F::Mask::from_bits(sound), octant, stack);
         self.report(&packet, first, count);
     }
@@ -263,7 +307,7 @@ impl<'t, W: Walker<'t>, const ANY: bool> Packets<'_, 't, W, ANY> {
                     alive = alive & !met;
                 }
             } else {
-                let met = self.other(packet, first, name, mask, reached);
+                let met = self.item(packet, first, name, mask, reached);
                 if ANY {
                     alive = alive & !met;
                 }
@@ -296,43 +340,52 @@ impl<'t, W: Walker<'t>, const ANY: bool> Packets<'_, 't, W, ANY> {
         self.counts.primitive_tests += u64::from(count * mask.to_bits().count_ones());
         let zero = F::zero();
         let mut met = F::Mask::splat(false);
-        for way in 0..packet.ways.len() {
-            let mask = mask & packet.ways[way];
-            if !mask.any() {
+        for lane in 0..count as usize {
+            let corners = block.triangle(lane);
+            let edges = packet.edges(corners);
+            let [u, v, w] = edges;
+            let up = u.ge(zero) & v.ge(zero) & w.ge(zero);
+            let down = u.le(zero) & v.le(zero) & w.le(zero);
+            let inside = (up ^ down) & mask;
+            if !inside.any() {
                 continue;
             }
-            let axes = axes_of(way);
-            for lane in 0..count as usize {
-                let [a, b, c] = block.triangle(lane);
-                let sheared = [along(a, axes), along(b, axes), along(c, axes)];
-                let [u, v, w] = packet.edges(sheared);
-                let up = u.ge(zero) & v.ge(zero) & w.ge(zero);
-                let down = u.le(zero) & v.le(zero) & w.le(zero);
-                let inside = (up ^ down) & mask;
-                if !inside.any() {
-                    continue;
-                }
-                let (low, high) = (a.min(b).min(c), a.max(b).max(c));
-                let slabs = [low.x, high.x, low.y, high.y, low.z, high.z];
-                let [own, far] = packet.boxes.enter(slabs, packet.octant);
-                let t = packet.distance([a, b, c].map(glam::Vec3::as_dvec3));
-                let there = inside & own.le(far) & zero.lt(t);
-                // Never before its own box: so no order of walking can miss it.
-                let t = t.max(own);
-                let id = F::Int::splat(block.ids[lane] ^ SIGN);
-                let first = t.eq(packet.limit) & id.lt(packet.id);
-                let better = there & (t.lt(packet.limit) | first);
-                packet.limit = F::select(better, t, packet.limit);
-                let (place, old) = (F::Int::splat(index << 2 | lane as u32), packet.place);
-                packet.id = F::select(better, id.from_bits(), packet.id.from_bits()).to_bits();
-                packet.place = F::select(better, place.from_bits(), old.from_bits()).to_bits();
-                met = met | better;
-            }
+            let [a, b, c] = corners;
+            let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+            let slabs = [low.x, high.x, low.y, high.y, low.z, high.z];
+            let [own, far] = packet.boxes.enter(slabs, packet.octant);
+            let t = packet.distance(corners.map(glam::Vec3::as_dvec3));
+            let there = inside & own.le(far) & zero.lt(t);
+            // Never before its own box: so no order of walking can miss it.
+            let place = Place(index << 2 | lane as u32);
+            met = met | packet.take(there, (t.max(own), edges), (block.ids[lane], place));
         }
         met
     }
 
-    /// Holds an item that is no triangle against the rays one by one; those that meet it.
+    /// Holds an item that is no triangle against the rays; those that meet it.
+    #[inline(always)]
+    fn item<F: Lanes>(
+        &mut self,
+        packet: &mut Packet<F>,
+        first: usize,
+        name: u32,
+        mask: F::Mask,
+        reached: F,
+    ) -> F::Mask {
+        let Some((sphere, number)) = self.walker.sphere(name & OTHER_INDEX) else {
+            return self.other(packet, first, name, mask, reached);
+        };
+        self.counts.primitive_tests += u64::from(mask.to_bits().count_ones());
+        let t = sphere.meet(packet.origin, packet.direction, packet.limit);
+        // What is not a number would become one.
+        let there = mask & t.le(packet.limit);
+        // Its u and v are 0.
+        let edges = [F::one(), F::zero(), F::zero()];
+        packet.take(there, (t.max(reached), edges), (number, Place::ITEM))
+    }
+
+    /// Holds any item against the rays one by one; those that meet it.
     #[inline(always)]
     fn other<F: Lanes>(
         &mut self,
@@ -347,9 +400,10 @@ impl<'t, W: Walker<'t>, const ANY: bool> Packets<'_, 't, W, ANY> {
         let mut places = packet.place.from_bits().row();
         let mut met = 0;
         for lane in mask.lanes() {
-            let ray = &self.rays[first + lane];
+            let index = self.sequence[first + lane] as usize;
+            let ray = &self.rays[index];
             let visit = Visit {
-                ray: first + lane,
+                ray: index,
                 instance: Hit::NONE,
                 entry: 0.0,
                 reached: reached[lane],
@@ -378,28 +432,24 @@ impl<'t, W: Walker<'t>, const ANY: bool> Packets<'_, 't, W, ANY> {
         F::Mask::from_bits(met)
     }
 
-    /// Hands the triangles that were found to the walker.
+    /// Hands the primitives that were found to the walker.
     #[inline(always)]
     fn report<F: Lanes>(&mut self, packet: &Packet<F>, first: usize, count: usize) {
         let (limit, ids) = (packet.limit.row(), packet.id.from_bits().row());
         let places = packet.place.from_bits().row();
+        let [u, v] = packet.barycentric();
+        let (u, v) = (u.row(), v.row());
         for lane in 0..count {
             let best = Best {
                 t: limit[lane],
                 id: ids[lane].to_bits() ^ SIGN,
                 place: Place(places[lane].to_bits()),
             };
-            if !best.is_inside() {
-                continue;
+            if best.is_inside() {
+                let index = self.sequence[first + lane] as usize;
+                self.walker
+                    .found(index, Hit::NONE, best, (u[lane], v[lane]));
             }
-            let mut uv = (0.0, 0.0);
-            if !ANY {
-                let place = places[lane].to_bits() as usize;
-                let corners = self.tree.blocks[place / BLOCK].triangle(place % BLOCK);
-                let shear = Shear::new(&self.rays[first + lane]);
-                uv = Shear::barycentric(shear.edges(corners));
-            }
-            self.walker.found(first + lane, Hit::NONE, best, uv);
         }
     }
 }

@@ -56,21 +56,23 @@ pub(in crate::accel) struct Best {
 }
 
 impl Best {
-    /// Whether it is a triangle of the tree that was walked.
+    /// Whether it is a primitive of the tree that was walked.
     #[inline(always)]
     pub(in crate::accel) fn is_inside(&self) -> bool {
         !matches!(self.place, Place::NOWHERE | Place::OUTSIDE)
     }
 }
 
-/// Where the best hit is written down: nowhere, with whoever started the walk, or a triangle's block and
-/// lane in the tree.
+/// Where the best hit is written down: nowhere, with whoever started the walk, or in the tree, as a triangle's block and
+/// lane or an item.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::accel) struct Place(pub(super) u32);
 
 impl Place {
     /// There is no hit yet.
     pub(in crate::accel) const NOWHERE: Self = Self(u32::MAX);
+    /// An item that is no triangle, and has the number of the best.
+    pub(in crate::accel) const ITEM: Self = Self(u32::MAX - 2);
     /// The walk was told of the hit, and does not keep it.
     pub(in crate::accel) const OUTSIDE: Self = Self(u32::MAX - 1);
 }
