@@ -1,13 +1,13 @@
-//! What a block of rays has met: from hits to points in lanes. Points on triangles of the world are made together,
-//! all others one by one.
+//! What a block of rays has met: from hits to points in lanes. Points on triangles of the world are made together, those on
+//! a sphere too, all others one by one.
 
 use glam::Vec2;
 
 use super::Tracer;
 use crate::interaction::{Hit, Interaction, Points, Ray, Source};
-use crate::lanes::{self, Frame, Lanes, Mask as _};
+use crate::lanes::{self, Call, Frame, Lanes, Mask as _};
 use crate::mesh::Mesh;
-use crate::shape::{Geometry, Triangles};
+use crate::shape::{Geometry, SurfacePoints, Triangles};
 
 /// Some of the rays that were traced together, each with its hit.
 #[derive(Clone, Copy, Debug)]
@@ -52,17 +52,26 @@ impl Met<'_> {
     #[inline(always)]
     pub fn points<F: Lanes>(&self) -> Points<'_, F> {
         let mut triangles = Triangles::<F>::default();
-        let mut others = 0_u32;
+        let (mut spheres, mut others) = (0_u32, 0_u32);
         for lane in 0..self.indices.len() {
             let hit = self.hit(lane);
             match self.tracer.shapes.get(hit.shape) {
                 Geometry::Mesh(mesh) if hit.instance == Hit::NONE => {
                     triangles.set(lane, mesh, hit.primitive, Vec2::new(hit.u, hit.v));
                 }
+                Geometry::Sphere(_) if hit.instance == Hit::NONE => spheres |= 1 << lane,
                 _ => others |= 1 << lane,
             }
         }
-        let surface = triangles.surface();
+        let mut surface = triangles.surface();
+        if spheres != 0 {
+            let (met, others) = (self, surface);
+            surface = F::call(OnSpheres {
+                met,
+                spheres,
+                others,
+            });
+        }
         let frame = surface.frame;
         let points = Points {
             active: F::Mask::from_bits(!(u32::MAX << self.indices.len())),
@@ -134,6 +143,47 @@ impl Met<'_> {
     }
 }
 
+/// Points with those of some lanes, which have met spheres of the world.
+struct OnSpheres<'a, F> {
+    met: &'a Met<'a>,
+    spheres: u32,
+    others: SurfacePoints<F>,
+}
+
+impl<F: Lanes> Call<F> for OnSpheres<'_, F> {
+    type Output = SurfacePoints<F>;
+
+    #[inline(always)]
+    fn run(self) -> SurfacePoints<F> {
+        let Self {
+            met,
+            mut spheres,
+            others: mut points,
+        } = self;
+        let mut places = [F::ROW; 3];
+        for lane in F::Mask::from_bits(spheres).lanes() {
+            let place = met.ray(lane).at(met.hit(lane).t);
+            for (row, value) in places.iter_mut().zip(place.to_array()) {
+                row[lane] = value;
+            }
+        }
+        let places = lanes::Vec3::<F>::load(&places);
+        while spheres != 0 {
+            let shape = met.hit(spheres.trailing_zeros() as usize).shape;
+            let mut own = 0;
+            for lane in F::Mask::from_bits(spheres).lanes() {
+                own |= u32::from(met.hit(lane).shape == shape) << lane;
+            }
+            spheres &= !own;
+            if let Geometry::Sphere(sphere) = met.tracer.shapes.get(shape) {
+                let own = F::Mask::from_bits(own);
+                points = SurfacePoints::select(own, sphere.points(places), points);
+            }
+        }
+        points
+    }
+}
+
 /// The vectors of rows where the mask is set, else the others.
 #[inline(always)]
 fn over<F: Lanes>(mask: F::Mask, rows: &[F::Row; 3], others: lanes::Vec3<F>) -> lanes::Vec3<F> {
@@ -153,5 +203,83 @@ impl Source for Met<'_> {
         let hit = self.hit(lane);
         let mesh = self.tracer.shapes.get(hit.shape).mesh()?;
         Some((mesh, hit.primitive, Vec2::new(hit.u, hit.v)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::surface_tests::{skew, surface};
+    use super::super::tests::direction;
+    use super::*;
+    use crate::accel::{Counts, Method, Order};
+    use crate::lanes::{Kernel, Task};
+    use crate::mesh;
+    use crate::shape::TriangleMesh;
+    use std::sync::Arc;
+
+    /// Holds points in lanes against single ones.
+    struct Compare<'a>(Met<'a>);
+
+    impl Task for Compare<'_> {
+        type Output = ();
+
+        #[inline(always)]
+        fn run<F: Lanes>(self) {
+            for indices in self.0.indices.chunks(F::WIDTH) {
+                let met = Met { indices, ..self.0 };
+                let points = met.points::<F>();
+                for lane in 0..indices.len() {
+                    let at = met.interaction(lane);
+                    let both = [
+                        (points.position, at.position),
+                        (points.error, at.error),
+                        (points.normal, at.normal),
+                        (points.frame.s, at.frame.s),
+                        (points.frame.t, at.frame.t),
+                        (points.frame.n, at.frame.n),
+                        (points.dp_du, at.dp_du),
+                        (points.dp_dv, at.dp_dv),
+                        (points.wi, at.wi),
+                    ];
+                    for (number, (lanes, one)) in both.into_iter().enumerate() {
+                        assert_eq!(lanes.lane(lane), one, "lane {lane}, vector {number}");
+                    }
+                    assert_eq!(points.uv.lane(lane), at.uv, "lane {lane}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn points_in_lanes_are_those_of_single_hits_whatever_a_block_has_met() {
+        let mut shapes: Vec<_> = (0..6)
+            .flat_map(|i| {
+                [r#"type="sphere""#, r#"type="disk""#].map(|what| surface(what, &skew(i)))
+            })
+            .collect();
+        shapes.push(Geometry::Mesh(TriangleMesh::new(mesh::bumpy_sphere(2, 5))));
+        let shapes: Vec<_> = shapes.into_iter().map(Arc::new).collect();
+        let groups = vec![0; shapes.len()];
+        let tracer = Tracer::new(shapes, &groups, Vec::new(), Method::Tree);
+        let ray = |i| Ray {
+            origin: direction(1, i) * 2.0,
+            direction: (direction(2, i) * 0.7 - direction(1, i)).normalize(),
+            t_max: f32::INFINITY,
+            time: 0.0,
+        };
+        let rays: Vec<Ray> = (0..2000).map(ray).collect();
+        let (mut hits, mut counts) = (Vec::new(), Counts::default());
+        tracer.closest(&rays, Order::Any, &mut hits, &mut counts);
+        let met = |i: &u32| !hits[*i as usize].is_miss();
+        let indices: Vec<u32> = (0..rays.len() as u32).filter(met).collect();
+        assert!(indices.len() > 1000);
+        for kernel in Kernel::all() {
+            kernel.run(Compare(Met {
+                tracer: &tracer,
+                rays: &rays,
+                hits: &hits,
+                indices: &indices,
+            }));
+        }
     }
 }

@@ -244,7 +244,7 @@ impl Surface for DeformingMesh {
             let normal = normal.map(|(a, b)| between(*a, *b, moment.part));
             triangles.place(0, corner, positions[corner], normal);
         }
-        triangles.surface().interaction(self.mesh(), ray, hit)
+        triangles.surface().interaction(Some(self.mesh()), ray, hit)
     }
 
     /// At the first time.

@@ -281,7 +281,7 @@ impl Surface for TriangleMesh {
     fn interaction(&self, ray: &Ray, hit: &Hit) -> Interaction<'_> {
         let mut triangles = Triangles::<f32>::default();
         triangles.set(0, self, hit.primitive, Vec2::new(hit.u, hit.v));
-        triangles.surface().interaction(&self.mesh, ray, hit)
+        triangles.surface().interaction(Some(&self.mesh), ray, hit)
     }
 
     fn area(&self) -> f64 {

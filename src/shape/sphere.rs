@@ -9,8 +9,8 @@ use std::f32::consts::{FRAC_1_PI, PI, TAU};
 use glam::{DMat4, DVec3, Mat3, Vec2, Vec3};
 
 use super::{
-    Bounds, Chart, Geometry, Shape, Surface, SurfaceSample, SurfaceSamples, area_to_solid_angle,
-    area_to_solid_angles,
+    Bounds, Chart, Geometry, Shape, Surface, SurfacePoints, SurfaceSample, SurfaceSamples,
+    area_to_solid_angle, area_to_solid_angles,
 };
 use crate::description::Properties;
 use crate::description::declared::{Plugin, float, vector};
@@ -114,10 +114,6 @@ impl Sphere {
         sin2 / (1.0 + (1.0 - sin2).sqrt())
     }
 
-    fn outward(&self, position: Vec3) -> Vec3 {
-        ((position - self.center) / self.radius).normalize()
-    }
-
     fn side(&self) -> f32 {
         if self.flip_normals { -1.0 } else { 1.0 }
     }
@@ -133,11 +129,33 @@ impl Sphere {
         }
     }
 
-    fn angles(&self, outward: Vec3) -> Vec2 {
-        let local = self.rotation.transpose() * outward;
-        let phi = local.y.atan2(local.x);
-        let phi = if phi < 0.0 { phi + TAU } else { phi };
-        Vec2::new(phi / TAU, local.z.clamp(-1.0, 1.0).acos() * FRAC_1_PI)
+    /// Texture coordinates, by the direction from the centre in the sphere's own space.
+    #[inline(always)]
+    fn angles<F: Lanes>(local: lanes::Vec3<F>) -> lanes::Vec2<F> {
+        let (turn, phi) = (F::splat(TAU), lanes::atan2(local.y, local.x));
+        let phi = F::select(phi.lt(F::zero()), phi + turn, phi);
+        let theta = lanes::acos(local.z);
+        lanes::Vec2::new(phi / turn, theta * F::splat(FRAC_1_PI))
+    }
+
+    /// A direction in the sphere's own space.
+    #[inline(always)]
+    fn to_local<F: Lanes>(&self, outward: lanes::Vec3<F>) -> lanes::Vec3<F> {
+        let axes = &self.rotation;
+        lanes::Vec3::new(
+            lanes::Vec3::all(axes.x_axis).dot(outward),
+            lanes::Vec3::all(axes.y_axis).dot(outward),
+            lanes::Vec3::all(axes.z_axis).dot(outward),
+        )
+    }
+
+    /// A direction in the sphere's own space, a radius long, in the world.
+    #[inline(always)]
+    fn scaled<F: Lanes>(&self, local: lanes::Vec3<F>) -> lanes::Vec3<F> {
+        let axes = self.rotation * self.radius;
+        lanes::Vec3::all(axes.x_axis) * local.x
+            + lanes::Vec3::all(axes.y_axis) * local.y
+            + lanes::Vec3::all(axes.z_axis) * local.z
     }
 }
 
@@ -176,6 +194,33 @@ impl Sphere {
         let t = F::select(F::zero().lt(near), near, far);
         let meets = meets & F::zero().lt(t) & t.le(t_max);
         F::select(meets, t, F::splat(f32::NAN))
+    }
+
+    /// The points of hits, which are about at these places.
+    #[inline(always)]
+    pub(crate) fn points<F: Lanes>(&self, places: lanes::Vec3<F>) -> SurfacePoints<F> {
+        let center = lanes::Vec3::<F>::all(self.center);
+        let radius = F::splat(self.radius);
+        let outward = ((places - center) / radius).normalize();
+        let normal = outward * F::splat(self.side());
+        let local = self.to_local(outward);
+        let rim = (local.x * local.x + local.y * local.y).sqrt();
+        // At the poles u goes nowhere, and v goes anywhere.
+        let pole = rim.eq(F::zero());
+        let cos = F::select(pole, F::one(), local.x / rim);
+        let sin = F::select(pole, F::zero(), local.y / rim);
+        let around = lanes::Vec3::new(-local.y, local.x, F::zero());
+        let down = lanes::Vec3::new(local.z * cos, local.z * sin, -rim);
+        let dp_du = self.scaled(around * F::splat(TAU));
+        SurfacePoints {
+            position: center + outward * radius,
+            error: (center.abs() + outward.abs() * radius) * F::splat(offset::gamma(5)),
+            normal,
+            frame: lanes::Frame::along(normal, dp_du),
+            uv: Self::angles(local),
+            dp_du,
+            dp_dv: self.scaled(down * F::splat(PI)),
+        }
     }
 
     /// [`Surface::sample`] in lanes.
@@ -242,41 +287,8 @@ impl Surface for Sphere {
     }
 
     fn interaction(&self, ray: &Ray, hit: &Hit) -> Interaction<'_> {
-        let outward = self.outward(ray.at(hit.t));
-        let position = self.center + self.radius * outward;
-        let error = offset::gamma(5) * (self.center.abs() + self.radius * outward.abs());
-        let normal = self.side() * outward;
-        let local = self.rotation.transpose() * outward;
-        let rim = (local.x * local.x + local.y * local.y).sqrt();
-        let (dp_du, dp_dv) = if rim > 0.0 {
-            let (cos, sin) = (local.x / rim, local.y / rim);
-            (
-                Vec3::new(-local.y, local.x, 0.0) * TAU,
-                Vec3::new(local.z * cos, local.z * sin, -rim) * PI,
-            )
-        } else {
-            (Vec3::ZERO, Vec3::new(local.z, 0.0, 0.0) * PI)
-        };
-        let scaled = self.rotation * self.radius;
-        let (dp_du, dp_dv) = (scaled * dp_du, scaled * dp_dv);
-        let frame = Frame::along(normal, dp_du);
-        Interaction {
-            t: hit.t,
-            position,
-            error,
-            normal,
-            frame,
-            uv: self.angles(outward),
-            dp_du,
-            dp_dv,
-            footprint: [Vec2::ZERO; 2],
-            wi: frame.to_local(-ray.direction),
-            time: ray.time,
-            shape: hit.shape,
-            primitive: 0,
-            mesh: None,
-            barycentric: Vec2::ZERO,
-        }
+        let met = ray.at(hit.t);
+        self.points::<f32>(met.into()).interaction(None, ray, hit)
     }
 
     fn area(&self) -> f64 {
@@ -313,7 +325,8 @@ impl Surface for Sphere {
     }
 
     fn uv(&self, point: &SurfaceSample) -> Vec2 {
-        self.angles(self.side() * point.normal)
+        let outward = self.side() * point.normal;
+        Self::angles(self.to_local::<f32>(outward.into())).into()
     }
 
     fn pdf(&self, from: Vec3, at: &Interaction<'_>) -> f32 {

@@ -2,10 +2,9 @@
 //! arithmetic.
 
 use super::TriangleMesh;
-use crate::interaction::{Hit, Interaction, Ray, offset};
+use crate::interaction::offset;
 use crate::lanes::{Doubles as _, Frame, Lanes, Vec2, Vec3};
-use crate::math;
-use crate::mesh::Mesh;
+use crate::shape::SurfacePoints;
 
 /// Rows of `N` components of each of the three corners.
 type Corners<F, const N: usize> = [[<F as Lanes>::Row; N]; 3];
@@ -20,49 +19,6 @@ pub struct Triangles<F: Lanes> {
     uvs: Corners<F, 2>,
     /// The second and third barycentric coordinate.
     barycentric: [F::Row; 2],
-}
-
-/// Points on triangles; the fields are those of [`crate::interaction::Points`].
-#[derive(Clone, Copy, Debug)]
-pub struct TrianglePoints<F> {
-    /// World space.
-    pub position: Vec3<F>,
-    /// A bound on its rounding error.
-    pub error: Vec3<F>,
-    /// The geometric normal.
-    pub normal: Vec3<F>,
-    /// The shading frame.
-    pub frame: Frame<F>,
-    /// Texture coordinates.
-    pub uv: Vec2<F>,
-    /// How the position changes with u.
-    pub dp_du: Vec3<F>,
-    /// How it changes with v.
-    pub dp_dv: Vec3<F>,
-}
-
-impl TrianglePoints<f32> {
-    /// The point that `ray` has met on a triangle of the mesh, by its `hit`.
-    pub(crate) fn interaction<'a>(self, mesh: &'a Mesh, ray: &Ray, hit: &Hit) -> Interaction<'a> {
-        let frame = math::Frame::from(self.frame);
-        Interaction {
-            t: hit.t,
-            position: self.position.into(),
-            error: self.error.into(),
-            normal: self.normal.into(),
-            frame,
-            uv: self.uv.into(),
-            dp_du: self.dp_du.into(),
-            dp_dv: self.dp_dv.into(),
-            footprint: [glam::Vec2::ZERO; 2],
-            wi: frame.to_local(-ray.direction),
-            time: ray.time,
-            shape: hit.shape,
-            primitive: hit.primitive,
-            mesh: Some(mesh),
-            barycentric: glam::Vec2::new(hit.u, hit.v),
-        }
-    }
 }
 
 /// Second and third coordinate at the corners of a triangle without texture coordinates, as it is and turned over: as in
@@ -136,7 +92,7 @@ impl<F: Lanes> Triangles<F> {
 
     /// The points.
     #[inline(always)]
-    pub fn surface(&self) -> TrianglePoints<F> {
+    pub fn surface(&self) -> SurfacePoints<F> {
         let (u, v) = (F::load(&self.barycentric[0]), F::load(&self.barycentric[1]));
         let w = F::one() - u - v;
         let [p0, p1, p2] = [
@@ -166,7 +122,7 @@ impl<F: Lanes> Triangles<F> {
         let zero = Vec3::splat(0.0);
         let dp_du = Vec3::select(untold, zero, du / determinant);
         let dp_dv = Vec3::select(untold, zero, dv / determinant);
-        TrianglePoints {
+        SurfacePoints {
             position: q0 + q1 + q2,
             error,
             normal,
