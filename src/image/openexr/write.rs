@@ -1,10 +1,11 @@
-//! Writing OpenEXR: float32 channels, scan lines in blocks of 16 packed by ZIP. The same image and
+//! Writing OpenEXR: float32 channels, scan lines in blocks of 16 packed by ZIP where that pays. The same image and
 //! metadata give the same bytes: blocks stand in the order of their lines and attributes in that of
 //! their names.
 
 use std::collections::HashMap;
 use std::io::Cursor;
 
+use ::exr::block::chunk::{Chunk, CompressedBlock, CompressedScanLineBlock};
 use ::exr::block::writer::ChunksWriter;
 use ::exr::block::{self, BlockIndex, UncompressedBlock};
 use ::exr::meta::BlockDescription;
@@ -28,6 +29,9 @@ const LONGEST_NAME: usize = 255;
 /// Coordinates beyond this are refused by OpenEXR.
 const LARGEST_COORDINATE: u32 = i32::MAX as u32 / 2;
 
+/// Blocks that packing makes smaller by less than this share are left as they are.
+const LEAST_GAIN: f64 = 0.1;
+
 /// The bytes of an OpenEXR file of this image, which may be a part of a whole.
 pub(crate) fn encode(image: &Image, window: &Window, metadata: &Metadata) -> Result<Vec<u8>> {
     check_window(image, window)?;
@@ -49,7 +53,11 @@ pub(crate) fn encode(image: &Image, window: &Window, metadata: &Metadata) -> Res
                     .par_iter()
                     .map(|&(number, index)| {
                         let block = fill(image, &order, header, index);
-                        Ok((number, block.compress_to_chunk(&meta.headers)?))
+                        let chunk = match shrinks(&block, header)? {
+                            true => block.compress_to_chunk(&meta.headers)?,
+                            false => as_it_is(block, header)?,
+                        };
+                        Ok((number, chunk))
                     })
                     .collect::<::exr::error::Result<_>>()?;
                 for (number, chunk) in chunks {
@@ -232,6 +240,33 @@ fn fill(image: &Image, order: &[usize], header: &Header, index: BlockIndex) -> U
         for (target, sample) in bytes.iter_mut().zip(samples) {
             *target = sample.to_ne_bytes();
         }
+    })
+}
+
+/// Whether packing makes a block smaller by more than [`LEAST_GAIN`], judged by its middle line: noise in 32 bits takes
+/// long to pack and hardly shrinks.
+fn shrinks(block: &UncompressedBlock, header: &Header) -> ::exr::error::Result<bool> {
+    let Vec2(width, height) = block.index.pixel_size;
+    let size = width * header.channels.bytes_per_pixel;
+    let line = block.data[height / 2 * size..][..size].to_vec();
+    let area = IntegerBounds::new((0, 0), (width, 1));
+    let packed = (header.compression).compress_image_section_to_le(header, line, area)?;
+    Ok((packed.len() as f64) < (1.0 - LEAST_GAIN) * size as f64)
+}
+
+/// A block that is not packed, which readers know by its size.
+fn as_it_is(block: UncompressedBlock, header: &Header) -> ::exr::error::Result<Chunk> {
+    let UncompressedBlock { index, data } = block;
+    let area = IntegerBounds::new((0, 0), index.pixel_size);
+    let compressed_pixels_le =
+        Compression::Uncompressed.compress_image_section_to_le(header, data, area)?;
+    let y = index.pixel_position.y() as i32 + header.own_attributes.layer_position.y();
+    Ok(Chunk {
+        layer_index: index.layer,
+        compressed_block: CompressedBlock::ScanLine(CompressedScanLineBlock {
+            y_coordinate: y,
+            compressed_pixels_le,
+        }),
     })
 }
 

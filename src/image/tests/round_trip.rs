@@ -103,6 +103,33 @@ fn exr_files_of_equal_images_are_equal() {
 }
 
 #[test]
+fn exr_blocks_of_noise_are_not_packed() {
+    let (width, noisy) = (200, 16 * 200 * 3);
+    let mut image = sample(width, 40, &["R", "G", "B"]);
+    image.data_mut()[noisy..].fill(0.5);
+    let mut state = 1_u32;
+    for value in &mut image.data_mut()[..noisy] {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        *value = 1.0 + (state >> 9) as f32 / (1 << 23) as f32;
+    }
+    let window = Window {
+        x: 3,
+        y: 20,
+        full_width: 300,
+        full_height: 70,
+    };
+    let bytes = openexr::encode(&image, &window, &Metadata::default()).unwrap();
+    let size = 4 * noisy;
+    assert!(
+        (size..size + 2000).contains(&bytes.len()),
+        "{}",
+        bytes.len()
+    );
+    let back = decode(Path::new("a.exr"), &bytes, &Budget::default().open()).unwrap();
+    assert_eq!(back.image, image);
+}
+
+#[test]
 fn exr_says_where_a_crop_lies() {
     let image = sample(5, 4, &["R", "G", "B"]);
     let window = Window {
