@@ -195,26 +195,29 @@ impl<const N: usize> ColorModel for Bands<N> {
     }
 
     fn develop(&self, pass: u32, sample: &Samples<N>, wavelengths: &Teeth<f32>, out: &mut [f32]) {
-        // The last pass may have a lane that is no band's.
-        let (mut values, count) = (*sample, wavelengths.count());
-        values.0[count..].fill(0.0);
         let rgb = Kernel::best().run(Seen {
-            values: &values.0,
+            values: &sample.0,
             wavelengths,
         });
         for c in 0..3 {
             out[c] = rgb[c] * self.comb.width();
         }
-        if self.responses.is_empty() {
-            let (first, every) = (pass as usize, self.passes() as usize);
-            let bands = &mut out[3..3 + self.comb.count()];
-            bands.fill(0.0);
-            for (number, value) in values.0[..count].iter().enumerate() {
-                bands[first + number * every] = *value;
+        let values = &sample.0[..wavelengths.count()];
+        match (self.responses.is_empty(), self.passes() as usize) {
+            (true, 1) => out[3..][..values.len()].copy_from_slice(values),
+            (true, passes) => {
+                let bands = &mut out[3..][..self.comb.count()];
+                bands.fill(0.0);
+                let own = bands[pass as usize..].iter_mut().step_by(passes);
+                for (band, value) in own.zip(values) {
+                    *band = *value;
+                }
             }
-        }
-        for (out, response) in out[3..].iter_mut().zip(self.responses.iter()) {
-            *out = response.of(&self.comb, &values.0[..count], wavelengths);
+            (false, _) => {
+                for (out, response) in out[3..].iter_mut().zip(self.responses.iter()) {
+                    *out = response.of(&self.comb, values, wavelengths);
+                }
+            }
         }
     }
 }
@@ -256,6 +259,8 @@ impl<const N: usize> Task for Seen<'_, N> {
                     true => F::from_fn(|lane| values.get(lane).copied().unwrap_or(0.0)),
                     false => F::from_slice(values),
                 };
+                // The last pass may have a lane that is no band's.
+                let value = F::select(self.wavelengths.there::<F>(first), value, F::zero());
                 let place = Between::of(self.wavelengths.from::<F>(first));
                 for (sum, curve) in sum.iter_mut().zip(observer) {
                     *sum = *sum + value * place.look_up(curve);

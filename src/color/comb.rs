@@ -104,9 +104,14 @@ impl Teeth<f32> {
     /// In lanes, one after another from one on.
     #[inline(always)]
     pub(super) fn from<F: Lanes>(&self, number: usize) -> F {
-        let numbers = F::from_fn(|lane| (number + lane) as f32);
-        let there = numbers.lt(F::splat(self.count as f32));
-        F::splat(self.first) + F::splat(self.step) * F::select(there, numbers, F::zero())
+        let numbers = F::select(self.there::<F>(number), numbers_from(number), F::zero());
+        F::splat(self.first) + F::splat(self.step) * numbers
+    }
+
+    /// Which of these there are.
+    #[inline(always)]
+    pub(super) fn there<F: Lanes>(&self, number: usize) -> F::Mask {
+        numbers_from::<F>(number).lt(F::splat(self.count as f32))
     }
 
     /// How many there are.
@@ -123,6 +128,12 @@ impl Teeth<f32> {
             ..*self
         }
     }
+}
+
+/// One number after another, in lanes.
+#[inline(always)]
+fn numbers_from<F: Lanes>(number: usize) -> F {
+    F::from_fn(|lane| (number + lane) as f32)
 }
 
 #[cfg(test)]
