@@ -10,6 +10,7 @@ use super::cie::{self, Between};
 use super::comb::{Comb, Teeth};
 use super::d65::d65;
 use super::model::{Color, ColorModel, Role, xyz_to_rgb};
+use super::per_lane::SpectrumPerLane;
 use super::response::Response;
 use super::samples::{Columns, Samples, Spectra as _, Spectral as _};
 use super::spectrum::{Spectrum, Upsampled};
@@ -57,6 +58,7 @@ impl<const N: usize> ColorModel for Bands<N> {
     type Wavelengths = Teeth<f32>;
     type Sample = Samples<N>;
     type Columns<F: Lanes> = Columns<F, N>;
+    type PerLane<F: Lanes> = SpectrumPerLane<F, N>;
 
     fn passes(&self) -> u32 {
         self.comb.count().div_ceil(self.carried.count()) as u32

@@ -2,6 +2,7 @@
 //! light is generic over [`ColorModel`]; geometry is not. A scene holds colours in their stored form, made
 //! once while it is built, and a path evaluates them at its own wavelengths.
 
+use super::per_lane::PerLane;
 use super::samples::{Spectra, Spectral};
 use super::texels::Pixels;
 use crate::lanes::{Lanes, Vec2};
@@ -57,6 +58,8 @@ pub trait ColorModel: Clone + std::fmt::Debug + Send + Sync + 'static {
     type Sample: Spectral;
     /// The samples of paths in lanes.
     type Columns<F: Lanes>: Spectra<F>;
+    /// Stored colours, one a lane.
+    type PerLane<F: Lanes>: PerLane<Self, F>;
 
     /// How many paths a sample takes: more than one where there are more bands than a path carries.
     fn passes(&self) -> u32 {

@@ -17,6 +17,7 @@ impl ColorModel for Mono {
     type Wavelengths = ();
     type Sample = Samples<1>;
     type Columns<F: Lanes> = Columns<F, 1>;
+    type PerLane<F: Lanes> = Columns<F, 1>;
 
     fn wavelengths(&self, _u: impl FnOnce() -> f32) {}
 

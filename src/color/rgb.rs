@@ -18,6 +18,7 @@ impl ColorModel for Rgb {
     type Wavelengths = ();
     type Sample = Samples<3>;
     type Columns<F: Lanes> = Columns<F, 3>;
+    type PerLane<F: Lanes> = Columns<F, 3>;
 
     fn wavelengths(&self, _u: impl FnOnce() -> f32) {}
 

@@ -42,11 +42,8 @@ impl Sigmoid {
     /// The same at wavelengths in lanes.
     #[inline(always)]
     pub(super) fn eval_lanes<F: Lanes>(&self, lambda: F) -> F {
-        let [c0, c1, c2] = self.c.map(|c| F::splat(c));
-        let v = (c0 * lambda + c1) * lambda + c2;
-        let root = (F::one() + v * v).sqrt();
-        let tail = F::splat(0.5) / (root * (root + v.abs()));
-        F::select(v.lt(F::zero()), tail, F::one() - tail)
+        let [c0, c1, c2] = self.c;
+        eval_lanes([F::splat(c0), F::splat(c1), F::splat(c2)], lambda)
     }
 
     /// From the coefficients of t², t and 1, where t runs from −1 to 1 over the visible range.
@@ -62,6 +59,15 @@ impl Sigmoid {
             ],
         }
     }
+}
+
+/// [`Sigmoid::eval`] with coefficients in lanes.
+#[inline(always)]
+pub(super) fn eval_lanes<F: Lanes>([c0, c1, c2]: [F; 3], lambda: F) -> F {
+    let v = (c0 * lambda + c1) * lambda + c2;
+    let root = (F::one() + v * v).sqrt();
+    let tail = F::splat(0.5) / (root * (root + v.abs()));
+    F::select(v.lt(F::zero()), tail, F::one() - tail)
 }
 
 /// ½ + ½·v/√(1 + v²) and its derivative, written so that small values keep their digits and infinite v

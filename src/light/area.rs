@@ -15,7 +15,7 @@ use super::{
     Ball, Draw, Emission, Emitter, LightContext, LightSample, LightSamples, Seen, Source,
     interaction, mean_of,
 };
-use crate::color::{ColorModel, Role, Spectral};
+use crate::color::{ColorModel, PerLane as _, Role, Spectral};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, texture};
 use crate::error::Result;
@@ -112,17 +112,18 @@ impl<C: ColorModel> BlockEmitter<C> for Area<C> {
         u: lanes::Vec2<F>,
         w: &[C::Wavelengths],
         active: F::Mask,
-    ) -> LightSamples<F, C::Columns<F>> {
-        let Texture::Uniform(radiance) = &self.radiance else {
+        radiance: &mut C::PerLane<F>,
+    ) -> LightSamples<F> {
+        let Texture::Uniform(color) = &self.radiance else {
             return LightSamples::none();
         };
+        radiance.put(active, color.value(), F::one(), w);
         let point = self.shape.sample_lanes(from, u, active);
         let direction = (point.position - from).normalize_or_zero();
         let lit = direction.dot(point.normal).lt(F::zero());
         LightSamples {
             direction,
             target: point.position,
-            radiance: C::evaluate_lanes(radiance.value(), w),
             pdf: F::select(lit, point.pdf, F::zero()),
             ..LightSamples::none()
         }

@@ -1,13 +1,13 @@
 //! Lights in lanes: directions from a block of points toward one light.
 
 use super::Light;
-use crate::color::{ColorModel, Spectra, Spectral};
+use crate::color::{ColorModel, PerLane, Spectra, Spectral};
 use crate::interaction::{Points, Reference, Source};
 use crate::lanes::{Call, Lanes, Mask as _, Vec2, Vec3};
 
-/// Directions drawn toward a light; the fields are those of [`super::LightSample`].
+/// Directions drawn toward a light; the fields are those of [`super::LightSample`]. Radiance comes last, once for all lights.
 #[derive(Clone, Copy, Debug)]
-pub struct LightSamples<F: Lanes, S> {
+pub struct LightSamples<F: Lanes, S = ()> {
     /// World space, unit length.
     pub direction: Vec3<F>,
     /// Where the light is, if it is not `distant`.
@@ -22,7 +22,7 @@ pub struct LightSamples<F: Lanes, S> {
     pub delta: F::Mask,
 }
 
-impl<F: Lanes, S: Spectra<F>> LightSamples<F, S> {
+impl<F: Lanes> LightSamples<F> {
     /// No light.
     #[inline(always)]
     pub fn none() -> Self {
@@ -30,7 +30,7 @@ impl<F: Lanes, S: Spectra<F>> LightSamples<F, S> {
             direction: Vec3::splat(0.0),
             target: Vec3::splat(0.0),
             distant: F::Mask::splat(false),
-            radiance: S::zero(),
+            radiance: (),
             pdf: F::zero(),
             delta: F::Mask::splat(false),
         }
@@ -43,23 +43,38 @@ impl<F: Lanes, S: Spectra<F>> LightSamples<F, S> {
             direction: Vec3::select(mask, yes.direction, no.direction),
             target: Vec3::select(mask, yes.target, no.target),
             distant: (mask & yes.distant) | (!mask & no.distant),
-            radiance: S::select(mask, yes.radiance, no.radiance),
+            radiance: (),
             pdf: F::select(mask, yes.pdf, no.pdf),
             delta: (mask & yes.delta) | (!mask & no.delta),
+        }
+    }
+
+    /// The same with radiance.
+    #[inline(always)]
+    pub fn with<S>(self, radiance: S) -> LightSamples<F, S> {
+        LightSamples {
+            direction: self.direction,
+            target: self.target,
+            distant: self.distant,
+            radiance,
+            pdf: self.pdf,
+            delta: self.delta,
         }
     }
 }
 
 /// A light that stands still and is written over lanes. Wavelengths are given from the first lane on.
 pub(super) trait BlockEmitter<C: ColorModel> {
-    /// [`super::Emitter::sample`] for the lanes that are `active`; what the others get is not used.
+    /// [`super::Emitter::sample`] for the lanes that are `active`; what the others get is not used. These lanes' radiance is
+    /// put into `radiance`.
     fn sample_lanes<F: Lanes>(
         &self,
         from: Vec3<F>,
         u: Vec2<F>,
         w: &[C::Wavelengths],
         active: F::Mask,
-    ) -> LightSamples<F, C::Columns<F>>;
+        radiance: &mut C::PerLane<F>,
+    ) -> LightSamples<F>;
 }
 
 /// The arguments of [`Light::sample_lanes`].
@@ -71,10 +86,11 @@ struct Draw<'a, C: ColorModel, F: Lanes> {
     u: Vec2<F>,
     w: &'a [C::Wavelengths],
     active: F::Mask,
+    radiance: &'a mut C::PerLane<F>,
 }
 
 impl<C: ColorModel, F: Lanes> Call<F> for Draw<'_, C, F> {
-    type Output = LightSamples<F, C::Columns<F>>;
+    type Output = LightSamples<F>;
 
     #[inline(always)]
     fn run(self) -> Self::Output {
@@ -86,14 +102,21 @@ impl<C: ColorModel, F: Lanes> Call<F> for Draw<'_, C, F> {
             active,
             ..
         } = self;
+        let radiance = &mut *self.radiance;
         match light {
             Light::Area(area) if area.is_written_over_lanes() => {
-                area.sample_lanes(from, u, w, active)
+                area.sample_lanes(from, u, w, active, radiance)
             }
-            Light::Constant(constant) => constant.sample_lanes(from, u, w, active),
-            Light::Directional(light) if light.is_still() => light.sample_lanes(from, u, w, active),
-            Light::Envmap(envmap) if envmap.is_still() => envmap.sample_lanes(from, u, w, active),
-            Light::Point(point) if point.is_still() => point.sample_lanes(from, u, w, active),
+            Light::Constant(constant) => constant.sample_lanes(from, u, w, active, radiance),
+            Light::Directional(light) if light.is_still() => {
+                light.sample_lanes(from, u, w, active, radiance)
+            }
+            Light::Envmap(envmap) if envmap.is_still() => {
+                envmap.sample_lanes(from, u, w, active, radiance)
+            }
+            Light::Point(point) if point.is_still() => {
+                point.sample_lanes(from, u, w, active, radiance)
+            }
             _ => self.each(),
         }
     }
@@ -109,6 +132,21 @@ impl<C: ColorModel> Light<C> {
         w: &[C::Wavelengths],
         active: F::Mask,
     ) -> LightSamples<F, C::Columns<F>> {
+        let mut radiance = C::PerLane::<F>::zero();
+        let samples = self.sample_among(from, u, w, active, &mut radiance);
+        samples.with(radiance.evaluate(w))
+    }
+
+    /// The same of one light among others, each for its own lanes, whose radiance is evaluated for all at once.
+    #[inline(always)]
+    pub fn sample_among<F: Lanes>(
+        &self,
+        from: &Points<'_, F>,
+        u: Vec2<F>,
+        w: &[C::Wavelengths],
+        active: F::Mask,
+        radiance: &mut C::PerLane<F>,
+    ) -> LightSamples<F> {
         F::call(Draw {
             light: self,
             from: from.position,
@@ -116,6 +154,7 @@ impl<C: ColorModel> Light<C> {
             u,
             w,
             active,
+            radiance,
         })
     }
 }
@@ -123,7 +162,7 @@ impl<C: ColorModel> Light<C> {
 impl<C: ColorModel, F: Lanes> Draw<'_, C, F> {
     /// Directions toward a light that is asked lane by lane.
     #[inline(always)]
-    fn each(self) -> LightSamples<F, C::Columns<F>> {
+    fn each(self) -> LightSamples<F> {
         let Self {
             light,
             from,
@@ -131,11 +170,12 @@ impl<C: ColorModel, F: Lanes> Draw<'_, C, F> {
             u,
             w,
             active,
+            radiance,
         } = self;
         let there = active.to_bits();
         let (mut direction, mut target, mut pdf) = ([F::ROW; 3], [F::ROW; 3], F::ROW);
         let (mut distant, mut delta) = (0, 0);
-        let radiance = Spectra::from_samples(|lane| {
+        let values = Spectra::from_samples(|lane| {
             let sample = if there >> lane & 1 == 1 {
                 let from = Reference {
                     position: from.lane(lane),
@@ -157,11 +197,12 @@ impl<C: ColorModel, F: Lanes> Draw<'_, C, F> {
             pdf[lane] = sample.pdf;
             sample.radiance
         });
+        radiance.put_values(active, values);
         LightSamples {
             direction: Vec3::<F>::load(&direction),
             target: Vec3::<F>::load(&target),
             distant: F::Mask::from_bits(distant),
-            radiance,
+            radiance: (),
             pdf: F::load(&pdf),
             delta: F::Mask::from_bits(delta),
         }
@@ -176,7 +217,9 @@ pub(super) fn single_sample<C: ColorModel, E: BlockEmitter<C>>(
     w: &C::Wavelengths,
 ) -> Option<super::LightSample<C::Sample>> {
     let w = std::slice::from_ref(w);
-    single(emitter.sample_lanes::<f32>(from.into(), u.into(), w, true))
+    let mut radiance = C::PerLane::<f32>::zero();
+    let samples = emitter.sample_lanes::<f32>(from.into(), u.into(), w, true, &mut radiance);
+    single(samples.with(radiance.evaluate(w)))
 }
 
 /// A single direction; `None` where nothing arrives.

@@ -4,7 +4,7 @@ use std::f32::consts::FRAC_1_PI;
 
 use super::block::{self, BlockEmitter};
 use super::{Emitter, LightContext, LightSample, LightSamples, mean_of};
-use crate::color::{ColorModel, Role};
+use crate::color::{ColorModel, PerLane as _, Role};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, color};
 use crate::error::Result;
@@ -50,12 +50,13 @@ impl<C: ColorModel> BlockEmitter<C> for Constant<C> {
         _from: Vec3<F>,
         u: Vec2<F>,
         w: &[C::Wavelengths],
-        _active: F::Mask,
-    ) -> LightSamples<F, C::Columns<F>> {
+        active: F::Mask,
+        radiance: &mut C::PerLane<F>,
+    ) -> LightSamples<F> {
+        radiance.put(active, &self.radiance, F::one(), w);
         LightSamples {
             direction: warp::uniform_sphere(u),
             distant: F::Mask::splat(true),
-            radiance: C::evaluate_lanes(&self.radiance, w),
             pdf: F::splat(PDF),
             ..LightSamples::none()
         }

@@ -7,7 +7,7 @@ use glam::{DVec3, Vec2, Vec3};
 
 use super::block::BlockEmitter;
 use super::{Emitter, LightContext, LightSample, LightSamples, mean_of, to_world};
-use crate::color::{ColorModel, Role};
+use crate::color::{ColorModel, PerLane as _, Role};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, color, vector};
 use crate::error::Result;
@@ -118,15 +118,16 @@ impl<C: ColorModel> BlockEmitter<C> for Directional<C> {
         _from: lanes::Vec3<F>,
         _u: lanes::Vec2<F>,
         w: &[C::Wavelengths],
-        _active: F::Mask,
-    ) -> LightSamples<F, C::Columns<F>> {
+        active: F::Mask,
+        radiance: &mut C::PerLane<F>,
+    ) -> LightSamples<F> {
         let Direction::Still(direction) = self.direction else {
             return LightSamples::none();
         };
+        radiance.put(active, &self.irradiance, F::one(), w);
         LightSamples {
             direction: lanes::Vec3::all(-direction),
             distant: F::Mask::splat(true),
-            radiance: C::evaluate_lanes(&self.irradiance, w),
             pdf: F::one(),
             delta: F::Mask::splat(true),
             ..LightSamples::none()

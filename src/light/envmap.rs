@@ -12,7 +12,7 @@ use glam::{Mat3, Vec2, Vec3};
 use super::block::{self, BlockEmitter};
 use super::grid::Grid;
 use super::{Emitter, LightContext, LightSample, LightSamples, Rotation};
-use crate::color::{ColorModel, Pixels, Role, Spectra as _, luminance};
+use crate::color::{ColorModel, PerLane as _, Pixels, Role, Spectra as _, luminance};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, boolean, file, float};
 use crate::error::Result;
@@ -181,26 +181,22 @@ fn weights(Picture { size, pixels, .. }: &Picture) -> Vec<f64> {
 }
 
 impl<C: ColorModel> Envmap<C> {
-    /// Directions, the image being turned by `to_world`.
+    /// Directions, the image being turned by `to_world`, and their places on it; `None` where all of it is black.
     #[inline(always)]
     fn sample_turned<F: Lanes>(
         &self,
         to_world: &Mat3,
         u: lanes::Vec2<F>,
-        w: &[C::Wavelengths],
-    ) -> LightSamples<F, C::Columns<F>> {
-        let Some(cells) = &self.cells else {
-            return LightSamples::none();
-        };
-        let (place, density) = cells.sample(u);
+    ) -> Option<(LightSamples<F>, lanes::Vec2<F>)> {
+        let (place, density) = self.cells.as_ref()?.sample(u);
         let (direction, sine) = self.direction(to_world, place);
-        LightSamples {
+        let samples = LightSamples {
             direction,
             distant: F::Mask::splat(true),
-            radiance: self.radiance(place, w),
             pdf: Self::per_solid_angle(density, sine),
             ..LightSamples::none()
-        }
+        };
+        Some((samples, place))
     }
 }
 
@@ -211,10 +207,15 @@ impl<C: ColorModel> BlockEmitter<C> for Envmap<C> {
         _from: lanes::Vec3<F>,
         u: lanes::Vec2<F>,
         w: &[C::Wavelengths],
-        _active: F::Mask,
-    ) -> LightSamples<F, C::Columns<F>> {
+        active: F::Mask,
+        radiance: &mut C::PerLane<F>,
+    ) -> LightSamples<F> {
         // Of one that stands still; another is asked lane by lane.
-        self.sample_turned(&self.to_world.at(0.0), u, w)
+        let Some((samples, place)) = self.sample_turned(&self.to_world.at(0.0), u) else {
+            return LightSamples::none();
+        };
+        radiance.put_values(active, self.radiance(place, w));
+        samples
     }
 }
 
@@ -227,7 +228,8 @@ impl<C: ColorModel> Emitter<C> for Envmap<C> {
     ) -> Option<LightSample<C::Sample>> {
         let to_world = self.to_world.at(from.time);
         let w = std::slice::from_ref(wavelengths);
-        block::single(self.sample_turned::<f32>(&to_world, u.into(), w))
+        let (samples, place) = self.sample_turned::<f32>(&to_world, u.into())?;
+        block::single(samples.with(self.radiance(place, w)))
     }
 
     fn is_environment(&self) -> bool {

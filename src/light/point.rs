@@ -9,7 +9,7 @@ use super::emission::from_point;
 use super::{
     Ball, Draw, Emission, Emitter, LightContext, LightSample, LightSamples, Origin, Seen, mean_of,
 };
-use crate::color::{ColorModel, Role};
+use crate::color::{ColorModel, PerLane as _, Role};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, color, vector};
 use crate::error::Result;
@@ -77,18 +77,19 @@ impl<C: ColorModel> BlockEmitter<C> for Point<C> {
         from: lanes::Vec3<F>,
         _u: lanes::Vec2<F>,
         w: &[C::Wavelengths],
-        _active: F::Mask,
-    ) -> LightSamples<F, C::Columns<F>> {
+        active: F::Mask,
+        radiance: &mut C::PerLane<F>,
+    ) -> LightSamples<F> {
         let Origin::Still(position) = self.position else {
             return LightSamples::none();
         };
         let target = lanes::Vec3::all(position);
         let way = target - from;
         let squared = way.length_squared();
+        radiance.put(active, &self.intensity, F::one() / squared, w);
         LightSamples {
             direction: way / squared.sqrt(),
             target,
-            radiance: C::evaluate_lanes(&self.intensity, w) * (F::one() / squared),
             pdf: F::select(F::zero().lt(squared), F::one(), F::zero()),
             delta: F::Mask::splat(true),
             ..LightSamples::none()

@@ -13,7 +13,7 @@ use std::collections::HashMap;
 use glam::Vec3;
 
 use crate::accel::{Counts, Order, Recipe, Tracer};
-use crate::color::{ColorModel, Spectral};
+use crate::color::{ColorModel, PerLane as _, Spectral};
 use crate::description::NodeId;
 use crate::error::Problem;
 use crate::interaction::{Hit, Interaction, Points, Ray};
@@ -302,9 +302,10 @@ impl<C: ColorModel> Scene<C> {
         w: &[C::Wavelengths],
     ) -> (LightSamples<F, C::Columns<F>>, Indices<F>) {
         let mut samples = LightSamples::none();
+        let mut radiance = C::PerLane::<F>::zero();
         let mut indices = F::Int::ROW;
         let Some(chosen) = self.choice.sample(u1) else {
-            return (samples, indices);
+            return (samples.with(radiance.evaluate(w)), indices);
         };
         chosen.store(&mut indices);
         // One light after another.
@@ -313,11 +314,13 @@ impl<C: ColorModel> Scene<C> {
             let light = LightId(indices[lane]);
             let mask = rest & chosen.eq(F::Int::splat(light.0));
             rest = rest & !mask;
-            let mut drawn = self.light(light).sample_lanes(from, u2, w, mask);
+            let mut drawn = self
+                .light(light)
+                .sample_among(from, u2, w, mask, &mut radiance);
             drawn.pdf = drawn.pdf * F::splat(self.choice.probability(light));
             samples = LightSamples::select(mask, drawn, samples);
         }
-        (samples, indices)
+        (samples.with(radiance.evaluate(w)), indices)
     }
 
     /// Radiance that the surface at `at` emits toward `at.wi`, and the density with which

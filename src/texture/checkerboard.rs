@@ -7,12 +7,12 @@ use std::any::TypeId;
 use glam::Mat3;
 
 use super::{Palette, Pattern, Texture, to_uv, transformed};
-use crate::color::{ColorModel, Mono, Spectra};
+use crate::color::{ColorModel, Mono, PerLane as _, Spectra};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, texture};
 use crate::error::Result;
 use crate::interaction::{Interaction, Points};
-use crate::lanes::{self, Lanes};
+use crate::lanes::{self, Lanes, Mask as _};
 
 /// Two textures in a pattern of squares.
 #[derive(Clone, Debug)]
@@ -69,8 +69,15 @@ impl<C: ColorModel> Checkerboard<C> {
         wavelengths: &[C::Wavelengths],
     ) -> C::Columns<F> {
         let [first, second] = &*self.colors;
+        let is_second = self.second(at.uv);
+        if let (Some(first), Some(second)) = (first.constant(), second.constant()) {
+            let mut colors = C::PerLane::<F>::zero();
+            colors.put(F::Mask::splat(true), first, F::one(), wavelengths);
+            colors.put(is_second, second, F::one(), wavelengths);
+            return colors.evaluate(wavelengths);
+        }
         C::Columns::<F>::select(
-            self.second(at.uv),
+            is_second,
             second.eval_lanes(at, wavelengths),
             first.eval_lanes(at, wavelengths),
         )
