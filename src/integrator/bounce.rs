@@ -4,7 +4,9 @@
 //! shift the next.
 
 use super::FIRST_DIMENSION;
+use crate::color::ColorModel;
 use crate::lanes::{Lanes, Vec2};
+use crate::material::Surface;
 use crate::sampler::{Sampler, Streams};
 
 /// Dimensions of a decision.
@@ -57,6 +59,15 @@ impl<'a, F: Lanes> Decisions<'a, F> {
     #[inline(always)]
     pub(super) fn u1(&self) -> F {
         self.sampler.number(self.streams, self.first + 2)
+    }
+
+    /// For which lobe; 0 where there is but one.
+    #[inline(always)]
+    pub(super) fn lobe<C: ColorModel>(&self, surface: &Surface<'_, C, F>) -> F {
+        match surface.has_one_lobe() {
+            true => F::zero(),
+            false => self.u1(),
+        }
     }
 
     /// The number for whether the path goes on.

@@ -13,6 +13,7 @@ use crate::description::Properties;
 use crate::description::declared::{Plugin, integer};
 use crate::error::Result;
 use crate::lanes::{Lanes, MAX_LANES};
+use crate::material::Surface;
 use crate::sampler::Sampler;
 use crate::scene::Scene;
 
@@ -153,13 +154,14 @@ impl<C: ColorModel> Shading<C> for Bounce<'_> {
 
     #[inline(always)]
     fn shade<F: Lanes>(&mut self, block: &Block<'_, C, F>, out: &mut Outcome<'_, C, Self::Shadow>) {
+        let surface = block.material.surface(&block.at, block.wavelengths);
         if block.material.is_smooth() {
             for number in 0..self.0.emitter_samples {
-                self.light(block, number, out);
+                self.light(block, &surface, number, out);
             }
         }
         for number in 0..self.0.bsdf_samples {
-            self.way(block, self.0.emitter_samples + number, out);
+            self.way(block, &surface, self.0.emitter_samples + number, out);
         }
     }
 }
@@ -170,6 +172,7 @@ impl Bounce<'_> {
     fn light<C: ColorModel, F: Lanes>(
         &self,
         block: &Block<'_, C, F>,
+        surface: &Surface<'_, C, F>,
         decision: u32,
         out: &mut Outcome<'_, C, Contribution<C::Sample>>,
     ) {
@@ -178,7 +181,7 @@ impl Bounce<'_> {
         let (at, w) = (&block.at, block.wavelengths);
         let light = block.scene.sample_lights(at, u1, u2, w);
         let wo = at.frame.to_local(light.direction);
-        let value = block.material.eval_lanes(at, at.wi, wo, w);
+        let value = surface.eval(wo);
         let [light_share, bsdf_share] = self.0.shares().map(F::splat);
         let other = F::select(light.delta, F::zero(), value.pdf * bsdf_share);
         let count = F::splat(self.0.emitter_samples as f32);
@@ -192,17 +195,16 @@ impl Bounce<'_> {
     fn way<C: ColorModel, F: Lanes>(
         &self,
         block: &Block<'_, C, F>,
+        surface: &Surface<'_, C, F>,
         decision: u32,
         out: &mut Outcome<'_, C, Contribution<C::Sample>>,
     ) {
         let numbers = block.decisions(decision);
-        let (u2, u1) = (numbers.u2(), numbers.u1());
-        let (at, w) = (&block.at, block.wavelengths);
-        let sample = block.material.sample_lanes(at, at.wi, u1, u2, w);
+        let sample = surface.sample(numbers.lobe(surface), numbers.u2());
         let [light_share, bsdf_share] = self.0.shares();
         let part = F::splat(1.0 / self.0.bsdf_samples as f32);
         let ways = Ways {
-            lives: sample.drawn & at.active,
+            lives: sample.drawn & block.at.active,
             wo: sample.wo,
             throughput: block.throughput * sample.weight * part,
             eta: sample.eta,

@@ -14,7 +14,7 @@ use crate::description::Properties;
 use crate::description::declared::Plugin;
 use crate::error::Result;
 use crate::lanes::{Lanes, Mask as _, Vec3};
-use crate::material::BsdfSamples;
+use crate::material::{BsdfSamples, Surface};
 use crate::sampler::Sampler;
 use crate::scene::Scene;
 
@@ -131,15 +131,16 @@ impl<C: ColorModel> Shading<C> for Bounce<'_, C> {
 
     #[inline(always)]
     fn shade<F: Lanes>(&mut self, block: &Block<'_, C, F>, out: &mut Outcome<'_, C, Self::Shadow>) {
+        let surface = block.material.surface(&block.at, block.wavelengths);
         let mut cells = None;
         if block.material.is_smooth() {
             if let Some(guide) = self.guide {
                 let found = guide.cells(&block.at);
                 cells = found.known.any().then_some(found);
             }
-            self.light(block, cells.as_ref(), out);
+            self.light(block, &surface, cells.as_ref(), out);
         }
-        self.way(block, cells.as_ref(), out);
+        self.way(block, &surface, cells.as_ref(), out);
     }
 }
 
@@ -149,6 +150,7 @@ impl<C: ColorModel> Bounce<'_, C> {
     fn light<F: Lanes>(
         &self,
         block: &Block<'_, C, F>,
+        surface: &Surface<'_, C, F>,
         cells: Option<&Cells<'_, F>>,
         out: &mut Outcome<'_, C, Contribution<C::Sample>>,
     ) {
@@ -157,7 +159,7 @@ impl<C: ColorModel> Bounce<'_, C> {
         let (at, w) = (&block.at, block.wavelengths);
         let light = block.scene.sample_lights(at, u1, u2, w);
         let wo = at.frame.to_local(light.direction);
-        let value = block.material.eval_lanes(at, at.wi, wo, w);
+        let value = surface.eval(wo);
         let pdf = match cells {
             Some(cells) => cells.mixed(light.direction, value.pdf),
             None => value.pdf,
@@ -172,17 +174,15 @@ impl<C: ColorModel> Bounce<'_, C> {
     fn way<F: Lanes>(
         &mut self,
         block: &Block<'_, C, F>,
+        surface: &Surface<'_, C, F>,
         cells: Option<&Cells<'_, F>>,
         out: &mut Outcome<'_, C, Contribution<C::Sample>>,
     ) {
         let numbers = block.decisions(WAY);
         let at = &block.at;
         let sample = match cells {
-            Some(cells) => draw_guided(block, cells, &numbers),
-            None => {
-                let (u2, u1) = (numbers.u2(), numbers.u1());
-                (block.material).sample_lanes(at, at.wi, u1, u2, block.wavelengths)
-            }
+            Some(cells) => draw_guided(block, surface, cells, &numbers),
+            None => surface.sample(numbers.lobe(surface), numbers.u2()),
         };
         for lane in (at.active & !(sample.drawn & sample.null)).lanes() {
             self.estimates[block.walker(lane).slot as usize].alpha = 1.0;
@@ -211,20 +211,21 @@ impl<C: ColorModel> Bounce<'_, C> {
 #[inline(always)]
 fn draw_guided<C: ColorModel, F: Lanes>(
     block: &Block<'_, C, F>,
+    surface: &Surface<'_, C, F>,
     cells: &Cells<'_, F>,
     numbers: &Decisions<'_, F>,
 ) -> BsdfSamples<F, C::Columns<F>> {
     let (u2, u1) = (numbers.u2(), numbers.u1());
-    let (at, w, material) = (&block.at, block.wavelengths, block.material);
+    let at = &block.at;
     let share = cells.share();
     let guided = u1.lt(share);
     let rest = F::one() - share;
     let below_one = F::splat(1f32.next_down());
     let lobe = ((u1 - share) / rest).max(F::zero()).min(below_one);
-    let sample = material.sample_lanes(at, at.wi, lobe, u2, w);
+    let sample = surface.sample(lobe, u2);
     let toward = cells.sample(guided, u2, at.frame.to_world(sample.wo));
     let wo = Vec3::select(guided, at.frame.to_local(toward), sample.wo);
-    let value = material.eval_lanes(at, at.wi, wo, w);
+    let value = surface.eval(wo);
     let pdf = cells.mixed(toward, value.pdf);
     let delta = sample.delta & !guided;
     let mixed = cells.known & !delta;

@@ -1,12 +1,12 @@
 //! `diffuse`: Lambert's law, f = reflectance / π on the front side; `reflectance` 0.5 by default.
 
-use super::{BlockBsdf, Bsdf, BsdfSamples, BsdfValues, Lobes, PhongTerms, single_face};
+use super::{BlockBsdf, Bsdf, BsdfSamples, BsdfValues, Lambertian, Lobes, PhongTerms, single_face};
 use crate::color::{Color, ColorModel, Role, Spectra};
 use crate::description::Properties;
 use crate::description::declared::{Plugin, texture};
 use crate::error::Result;
 use crate::interaction::Points;
-use crate::lanes::{Lanes, Vec2, Vec3, warp};
+use crate::lanes::{Lanes, Mask as _, Vec2, Vec3, warp};
 use crate::texture::{Palettes, Texture};
 
 /// An ideal matte surface.
@@ -44,6 +44,44 @@ impl<C: ColorModel> Diffuse<C> {
     }
 }
 
+/// Lambert's law for a reflectance.
+#[inline(always)]
+pub(super) fn eval<F: Lanes, S: Spectra<F>>(
+    reflectance: S,
+    wi: Vec3<F>,
+    wo: Vec3<F>,
+) -> BsdfValues<F, S> {
+    let seen = F::zero().lt(wi.z) & F::zero().lt(wo.z);
+    let pdf = warp::cosine_hemisphere_pdf(wo.z);
+    let pdf = F::select(seen, pdf, F::zero());
+    BsdfValues {
+        value: reflectance * pdf,
+        pdf,
+    }
+}
+
+/// Draws directions by the cosine, where any light is reflected.
+#[inline(always)]
+pub(super) fn sample<F: Lanes, S: Spectra<F>>(
+    reflectance: S,
+    wi: Vec3<F>,
+    u2: Vec2<F>,
+) -> BsdfSamples<F, S> {
+    let wo = warp::cosine_hemisphere(u2);
+    let pdf = warp::cosine_hemisphere_pdf(wo.z);
+    let possible = F::zero().lt(pdf) & pdf.is_finite();
+    let none = F::Mask::splat(false);
+    BsdfSamples {
+        drawn: possible & F::zero().lt(wi.z) & !reflectance.is_black(),
+        wo,
+        weight: reflectance,
+        pdf,
+        eta: F::one(),
+        delta: none,
+        null: none,
+    }
+}
+
 impl<C: ColorModel> BlockBsdf<C> for Diffuse<C> {
     #[inline(always)]
     fn eval_lanes<F: Lanes>(
@@ -53,10 +91,7 @@ impl<C: ColorModel> BlockBsdf<C> for Diffuse<C> {
         wo: Vec3<F>,
         w: &[C::Wavelengths],
     ) -> BsdfValues<F, C::Columns<F>> {
-        let seen = F::zero().lt(wi.z) & F::zero().lt(wo.z);
-        let pdf = warp::cosine_hemisphere_pdf(wo.z);
-        let value = self.reflectance.eval_lanes(at, w) * pdf;
-        BsdfValues { value, pdf }.only(seen)
+        eval(self.reflectance.eval_lanes(at, w), wi, wo)
     }
 
     #[inline(always)]
@@ -68,19 +103,7 @@ impl<C: ColorModel> BlockBsdf<C> for Diffuse<C> {
         u2: Vec2<F>,
         w: &[C::Wavelengths],
     ) -> BsdfSamples<F, C::Columns<F>> {
-        let wo = warp::cosine_hemisphere(u2);
-        let pdf = warp::cosine_hemisphere_pdf(wo.z);
-        let weight = self.reflectance.eval_lanes(at, w);
-        let values = BsdfValues {
-            value: weight * pdf,
-            pdf,
-        };
-        let samples = values.as_samples(wo, F::one());
-        BsdfSamples {
-            drawn: samples.drawn & F::zero().lt(wi.z) & !weight.is_black(),
-            weight,
-            ..samples
-        }
+        sample(self.reflectance.eval_lanes(at, w), wi, u2)
     }
 
     #[inline(always)]
@@ -106,6 +129,13 @@ impl<C: ColorModel> Bsdf<C> for Diffuse<C> {
 
     fn is_matte(&self) -> bool {
         true
+    }
+
+    fn lambertian(&self) -> Option<Lambertian<'_, C>> {
+        Some(Lambertian {
+            reflectance: &self.reflectance,
+            twosided: false,
+        })
     }
 
     single_face!();

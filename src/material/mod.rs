@@ -34,6 +34,7 @@ mod ior;
 mod microfacet;
 mod perturbed;
 mod sheet;
+mod surface;
 mod tensor_file;
 mod warp2d;
 
@@ -48,6 +49,7 @@ use crate::texture::{Palettes, Texture};
 
 use block::{BlockBsdf, Visitor, single_face};
 pub use block::{BsdfSamples, BsdfValues, PhongTerms};
+pub use surface::{Lambertian, Surface};
 
 /// A direction drawn from a BSDF.
 #[derive(Clone, Copy, Debug)]
@@ -110,6 +112,11 @@ pub trait Bsdf<C: ColorModel>: std::fmt::Debug + Send + Sync {
     /// Whether what it returns of light goes by the cosine of the light's direction alone, on the side from which it is seen.
     fn is_matte(&self) -> bool {
         false
+    }
+
+    /// What it is made of where it scatters by Lambert's law and in no other way.
+    fn lambertian(&self) -> Option<Lambertian<'_, C>> {
+        None
     }
 
     /// Whether light may go straight on through it as if nothing were there: see [`Material::passing_lanes`].

@@ -147,6 +147,10 @@ const MATERIALS: &[(&str, &str)] = &[
     ),
     (
         "twosided",
+        r#"<bsdf type="twosided"><bsdf type="diffuse"/></bsdf>"#,
+    ),
+    (
+        "twosided",
         r#"<bsdf type="twosided"><bsdf type="phong"><float name="exponent" value="9"/></bsdf></bsdf>"#,
     ),
     (
@@ -780,8 +784,8 @@ impl Task for Ask<'_> {
             let u1 = block.numbers(|q| q.u1);
             let u2 = block.vectors(|q| q.u2.extend(0.0)).xy();
             let w = &[(); lanes::MAX_LANES];
-            let values = self.material.eval_lanes(&at, at.wi, wo, w);
-            let samples = self.material.sample_lanes(&at, at.wi, u1, u2, w);
+            let surface = self.material.surface(&at, w);
+            let (values, samples) = (surface.eval(wo), surface.sample(u1, u2));
             let of = |mask: F::Mask, lane: usize| mask.to_bits() >> lane & 1 == 1;
             answers.extend((0..F::WIDTH).map(|lane| {
                 let value: Samples<3> = values.value.sample(lane);

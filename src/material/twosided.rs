@@ -1,7 +1,8 @@
 //! `twosided`: lets a one-sided material be seen from both sides; a second nested one covers the back.
 
 use super::{
-    BlockBsdf, Bsdf, BsdfSamples, BsdfValues, Lobes, Material, PhongTerms, nested, single_face,
+    BlockBsdf, Bsdf, BsdfSamples, BsdfValues, Lambertian, Lobes, Material, PhongTerms, nested,
+    single_face,
 };
 use crate::color::{ColorModel, Spectra};
 use crate::description::declared::{Plugin, boolean, nested as nested_row};
@@ -75,6 +76,14 @@ impl<C: ColorModel> Bsdf<C> for TwoSided<C> {
         self.front.is_matte() && self.back.as_ref().is_none_or(|back| back.is_matte())
     }
 
+    fn lambertian(&self) -> Option<Lambertian<'_, C>> {
+        let front = self.front.lambertian().filter(|_| self.back.is_none())?;
+        Some(Lambertian {
+            twosided: true,
+            ..front
+        })
+    }
+
     fn passes(&self) -> bool {
         self.front.passes() || self.back.as_ref().is_some_and(|back| back.passes())
     }
@@ -87,12 +96,10 @@ impl<C: ColorModel> Bsdf<C> for TwoSided<C> {
     }
 }
 
-impl<C: ColorModel> TwoSided<C> {
-    /// Points of which those seen from behind are turned over.
-    #[inline(always)]
-    fn turned<F: Lanes>(behind: F::Mask, v: Vec3<F>) -> Vec3<F> {
-        Vec3::new(v.x, v.y, F::select(behind, -v.z, v.z))
-    }
+/// Directions of which those at points seen from behind are turned over.
+#[inline(always)]
+pub(super) fn turned<F: Lanes>(behind: F::Mask, v: Vec3<F>) -> Vec3<F> {
+    Vec3::new(v.x, v.y, F::select(behind, -v.z, v.z))
 }
 
 impl<C: ColorModel> BlockBsdf<C> for TwoSided<C> {
@@ -105,7 +112,7 @@ impl<C: ColorModel> BlockBsdf<C> for TwoSided<C> {
         w: &[C::Wavelengths],
     ) -> BsdfValues<F, C::Columns<F>> {
         let behind = wi.z.lt(F::zero());
-        let (wi, wo) = (Self::turned(behind, wi), Self::turned(behind, wo));
+        let (wi, wo) = (turned(behind, wi), turned(behind, wo));
         let front = self.front.eval_lanes(at, wi, wo, w);
         match &self.back {
             Some(back) if (behind & at.active).any() => {
@@ -123,7 +130,7 @@ impl<C: ColorModel> BlockBsdf<C> for TwoSided<C> {
         w: &[C::Wavelengths],
     ) -> BsdfValues<F, C::Columns<F>> {
         let behind = wi.z.lt(F::zero());
-        let wi = Self::turned(behind, wi);
+        let wi = turned(behind, wi);
         let front = self.front.passing_lanes(at, wi, w);
         match &self.back {
             Some(back) => BsdfValues::select(behind, back.passing_lanes(at, wi, w), front),
@@ -141,7 +148,7 @@ impl<C: ColorModel> BlockBsdf<C> for TwoSided<C> {
         w: &[C::Wavelengths],
     ) -> BsdfSamples<F, C::Columns<F>> {
         let behind = wi.z.lt(F::zero());
-        let wi = Self::turned(behind, wi);
+        let wi = turned(behind, wi);
         let front = self.front.sample_lanes(at, wi, u1, u2, w);
         let samples = match &self.back {
             Some(back) if (behind & at.active).any() => {
@@ -150,7 +157,7 @@ impl<C: ColorModel> BlockBsdf<C> for TwoSided<C> {
             _ => front,
         };
         BsdfSamples {
-            wo: Self::turned(behind, samples.wo),
+            wo: turned(behind, samples.wo),
             ..samples
         }
     }
@@ -164,7 +171,7 @@ impl<C: ColorModel> BlockBsdf<C> for TwoSided<C> {
         w: &[C::Wavelengths],
     ) -> Option<PhongTerms<C::Columns<F>>> {
         let behind = wi.z.lt(F::zero());
-        let (wi, wo) = (Self::turned(behind, wi), Self::turned(behind, wo));
+        let (wi, wo) = (turned(behind, wi), turned(behind, wo));
         let front = self.front.phong_lanes(at, wi, wo, w);
         let Some(back) = &self.back else {
             return Some(front);

@@ -6,6 +6,7 @@ use crate::integrator::Estimate;
 use crate::integrator::limits::Limits;
 use crate::integrator::wave::{Block, Outcome, Shading, Ways};
 use crate::lanes::{Lanes, Mask as _, Vec3};
+use crate::material::Surface;
 
 /// A round at surfaces.
 pub(super) struct Surfaces<'a, C: ColorModel> {
@@ -22,23 +23,29 @@ impl<C: ColorModel> Shading<C, Carried<C::Sample>> for Surfaces<'_, C> {
 
     #[inline(always)]
     fn shade<F: Lanes>(&mut self, block: &At<'_, C, F>, out: &mut Out<'_, C>) {
+        let surface = block.material.surface(&block.at, block.wavelengths);
         if block.material.is_smooth() {
-            self.light(block, out);
+            self.light(block, &surface, out);
         }
-        self.way(block, out);
+        self.way(block, &surface, out);
     }
 }
 
 impl<C: ColorModel> Surfaces<'_, C> {
     /// Draws light toward the points of paths that may be longer by one edge.
     #[inline(always)]
-    fn light<F: Lanes>(&self, block: &At<'_, C, F>, out: &mut Out<'_, C>) {
+    fn light<F: Lanes>(
+        &self,
+        block: &At<'_, C, F>,
+        surface: &Surface<'_, C, F>,
+        out: &mut Out<'_, C>,
+    ) {
         let numbers = block.decisions(LIGHT);
         let (u2, u1) = (numbers.u2(), numbers.u1());
         let (at, w) = (&block.at, block.wavelengths);
         let light = block.scene.sample_lights(at, u1, u2, w);
         let wo = at.frame.to_local(light.direction);
-        let value = block.material.eval_lanes(at, at.wi, wo, w);
+        let value = surface.eval(wo);
         let contribution = block.throughput * value.value * light.radiance;
         let lit = at.active & F::zero().lt(light.pdf) & !contribution.is_black();
         let lit = lit & !self.ends(block, lit);
@@ -80,11 +87,14 @@ impl<C: ColorModel> Surfaces<'_, C> {
 
     /// Turns the paths.
     #[inline(always)]
-    fn way<F: Lanes>(&mut self, block: &At<'_, C, F>, out: &mut Out<'_, C>) {
-        let numbers = block.decisions(WAY);
-        let (u2, u1) = (numbers.u2(), numbers.u1());
-        let (at, w) = (&block.at, block.wavelengths);
-        let sample = block.material.sample_lanes(at, at.wi, u1, u2, w);
+    fn way<F: Lanes>(
+        &mut self,
+        block: &At<'_, C, F>,
+        surface: &Surface<'_, C, F>,
+        out: &mut Out<'_, C>,
+    ) {
+        let (at, numbers) = (&block.at, block.decisions(WAY));
+        let sample = surface.sample(numbers.lobe(surface), numbers.u2());
         for lane in (at.active & !(sample.drawn & sample.null)).lanes() {
             self.estimates[block.walker(lane).slot as usize].alpha = 1.0;
         }
