@@ -35,8 +35,10 @@ pub(super) struct ImageArguments {
     #[arg(long, value_name = "OPEN,CLOSE|DEGREES", value_parser = parse::shutter, allow_hyphen_values = true, help_heading = IMAGE)]
     shutter: Option<parse::Shutter>,
     /// Frames in a unit of the scene's time; of a glTF file's animation that is a second
-    #[arg(long, default_value_t = 24.0, value_name = "N", value_parser = parse::positive, help_heading = IMAGE)]
-    fps: f64,
+    ///
+    /// [default: 24]
+    #[arg(long, value_name = "N", value_parser = parse::positive, help_heading = IMAGE)]
+    fps: Option<f64>,
     #[command(flatten)]
     method: MethodArguments,
 }
@@ -73,12 +75,17 @@ impl ImageArguments {
 
     /// When the shutter of a frame is open, if that is said.
     pub(super) fn shutter(&self, frame: i64) -> Option<(f64, f64)> {
-        Some(self.shutter?.times(frame, self.fps))
+        Some(self.shutter?.times(frame, self.fps()))
     }
 
     /// Frames in a unit of time.
     pub(super) fn fps(&self) -> f64 {
-        self.fps
+        self.fps.unwrap_or(24.0)
+    }
+
+    /// Whether that is said.
+    pub(super) fn has_fps(&self) -> bool {
+        self.fps.is_some()
     }
 
     /// RGB or bands.

@@ -384,6 +384,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         let message = format!("{option} is for bare meshes, and no input is one");
         series.warn_of(&Error::input(message).problems()[0]);
     }
+    let image = &arguments.image;
+    if image.has_fps() && arguments.frames.is_none() && image.shutter(0).is_none() {
+        let message = "--fps says nothing without --frames or --shutter";
+        series.warn_of(&Error::input(message).problems()[0]);
+    }
     let style = arguments.style();
     let mut endings = Vec::new();
     for (input, error) in failed {

@@ -10,7 +10,7 @@ use super::read::{
     Decoded, Input, Loaded, ReadOptions, extension, read_near, read_on, warnings, with_input,
 };
 use super::select::{NOWHERE, select};
-use super::surface::FACE_SURFACE;
+use super::surface::{FACE_SURFACE, Surface};
 use super::{Attribute, Mesh, Per, gltf, obj, serialized};
 use crate::budget::{Account, Budget};
 use crate::error::{Error, Location, Problem, Result};
@@ -50,8 +50,12 @@ pub fn read_parts(path: &Path, budget: &Budget) -> Result<Parts> {
         "obj" => obj_parts(path, &account)?,
         "serialized" => serialized_parts(path, &account)?,
         _ => {
-            let mut parts = Parts::default();
-            parts.add(String::new(), read_on(path, &ReadOptions::BARE, &account)?);
+            let loaded = read_on(path, &ReadOptions::BARE, &account)?;
+            let mut parts = Parts {
+                warnings: unkept(path, &loaded),
+                ..Parts::default()
+            };
+            parts.add(String::new(), loaded);
             parts
         }
     };
@@ -82,6 +86,16 @@ impl Parts {
         parts.for_each(|part| mesh.append(part.mesh));
         mesh
     }
+}
+
+/// What parts lose of a file's materials, in a word.
+fn unkept(path: &Path, loaded: &Loaded) -> Vec<Problem> {
+    let mut surfaces = loaded.surfaces.iter();
+    let message = surfaces.any(|surface| *surface != Surface::MATTE).then(|| {
+        "materials are kept by their colours alone: without images, finish, emission and transparency"
+            .to_owned()
+    });
+    warnings(path, Vec::from_iter(message))
 }
 
 fn gltf_parts(path: &Path, account: &Account) -> Result<Parts> {
@@ -155,7 +169,10 @@ fn obj_parts(path: &Path, account: &Account) -> Result<Parts> {
     })?;
     drop(bytes);
     (loaded.mesh.attributes).retain(|attribute| attribute.name != FACE_SURFACE);
-    let mut parts = Parts::default();
+    let mut parts = Parts {
+        warnings: unkept(path, &loaded),
+        ..Parts::default()
+    };
     if !is_split {
         parts.add(String::new(), loaded);
         return Ok(parts);

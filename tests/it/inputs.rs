@@ -829,6 +829,11 @@ const COMMANDS: &[(&str, i32, &str)] = &[
         "--material is for bare meshes",
     ),
     (
+        "render scene.xml -o b.png --fps 30",
+        0,
+        "--fps says nothing without --frames or --shutter",
+    ),
+    (
         "render nan.ply -o b.png",
         1,
         "of each of its 1 a corner is not finite",

@@ -153,6 +153,18 @@ enum Path {
     Weights,
 }
 
+impl Path {
+    fn of(name: &str) -> Option<Self> {
+        match name {
+            "translation" => Some(Self::Translation),
+            "rotation" => Some(Self::Rotation),
+            "scale" => Some(Self::Scale),
+            "weights" => Some(Self::Weights),
+            _ => None,
+        }
+    }
+}
+
 impl Moving {
     /// Whether a scale mirrors at some of the moments, and at others does not.
     fn turns_over(&self, moments: &[f32]) -> bool {
@@ -181,6 +193,23 @@ impl Moving {
     }
 }
 
+/// What is not shown of a file's animations, in words.
+pub(super) fn left_out(root: &Root<'_>) -> Vec<&'static str> {
+    let Some((first, others)) = root.animations.split_first() else {
+        return Vec::new();
+    };
+    let is_unknown = |channel: &&Channel| {
+        channel.target.node.is_none() || Path::of(&channel.target.path).is_none()
+    };
+    let unknown = first.channels.iter().filter(is_unknown);
+    let unknown =
+        unknown.map(|_| "channels of the animation that move no node, or move it in an unknown way, are left out");
+    let others = others
+        .iter()
+        .map(|_| "animations after the first are left out");
+    unknown.chain(others).collect()
+}
+
 /// All that moves in the first animation.
 fn channels(accessors: &Accessors<'_>) -> OrWhy<Vec<Moving>> {
     let Some(animation) = accessors.root.animations.first() else {
@@ -205,12 +234,8 @@ fn moving(
         return Ok(None);
     };
     at(&accessors.root.nodes, node, "node")?;
-    let path = match channel.target.path.as_str() {
-        "translation" => Path::Translation,
-        "rotation" => Path::Rotation,
-        "scale" => Path::Scale,
-        "weights" => Path::Weights,
-        _ => return Ok(None),
+    let Some(path) = Path::of(&channel.target.path) else {
+        return Ok(None);
     };
     let (values, width) = match path {
         Path::Translation | Path::Scale => {

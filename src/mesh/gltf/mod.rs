@@ -412,6 +412,9 @@ fn walk(input: Input<'_>, options: &ReadOptions, look: Look) -> Result<Walk> {
                 account,
             };
             let changes = animation::changes(&accessors, time.seconds())?;
+            for what in animation::left_out(&root) {
+                walk.notes.add(what);
+            }
             root.apply(changes);
         }
         let stage = Stage::set(&root, &mut walk.notes)?;

@@ -830,7 +830,7 @@ fn an_animation_stands_where_it_is_at_a_time() {
         "channels": [channel(0, "translation"), channel(1, "rotation"), channel(2, "scale"), channel(3, "weights"),
             {"sampler": 0, "target": {"path": "pointer"}}],
         "samplers": [{"input": times, "output": translation}, sampler(rotation, "LINEAR"), sampler(scale, "STEP"),
-            sampler(weights, "CUBICSPLINE")]}]);
+            sampler(weights, "CUBICSPLINE")]}, {"channels": [], "samplers": []}]);
     let corner = |time: Option<f32>| {
         let options = ReadOptions {
             time: time.map(crate::mesh::Time::of),
@@ -849,6 +849,19 @@ fn an_animation_stands_where_it_is_at_a_time() {
     // Corner 1 is at (2, 0, 0).
     near(None, Vec3::new(2.0, 0.0, 0.0));
     near(Some(0.0), Vec3::new(2.0, 0.0, 0.0));
+    let options = ReadOptions {
+        time: Some(crate::mesh::Time::of(0.0)),
+        ..ReadOptions::default()
+    };
+    let told = decode("test.gltf", &document.text(), &options)
+        .unwrap()
+        .warnings;
+    let told: Vec<String> = told.iter().map(ToString::to_string).collect();
+    let expected = [
+        "animations after the first are left out",
+        "channels of the animation that move no node, or move it in an unknown way, are left out",
+    ];
+    assert_eq!(told, expected.map(|said| format!("test.gltf: {said}")));
     // Half way: moved by 2, turned by 45°, not yet stretched; half of the weight and an eighth of twice a slope of 1.
     near(
         Some(2.0),

@@ -129,6 +129,38 @@ fn materials_and_objects_are_found_whatever_ends_their_lines() {
 }
 
 #[test]
+fn what_parts_lose_of_a_material_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.obj");
+    std::fs::write(
+        &path,
+        "mtllib a.mtl\nusemtl red\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
+    )
+    .unwrap();
+    for (material, told) in [
+        ("Kd 1 0 0", 0),
+        ("Kd 1 0 0\nmap_Kd a.png", 1),
+        ("Ke 1 0 0", 1),
+    ] {
+        std::fs::write(
+            folder.path().join("a.mtl"),
+            format!("newmtl red\n{material}\n"),
+        )
+        .unwrap();
+        let read = read_parts(&path, &Budget::default()).unwrap();
+        let alone = |problem: &&crate::error::Problem| {
+            problem.to_string().contains("by their colours alone")
+        };
+        assert_eq!(
+            read.warnings.iter().filter(alone).count(),
+            told,
+            "{material}: {:?}",
+            read.warnings
+        );
+    }
+}
+
+#[test]
 fn an_stl_file_may_hold_several_solids_and_its_colours_are_said_to_be_left_out() {
     let one = String::from_utf8(stl_text(&cube())).unwrap();
     let other = one.replace("endsolid", "end solid");
