@@ -292,6 +292,11 @@ pub trait Ints:
     fn load(row: &Self::Row) -> Self;
     /// To a row.
     fn store(self, row: &mut Self::Row);
+    /// To the first numbers of a slice, with a sign.
+    ///
+    /// # Panics
+    /// Where there are fewer than lanes.
+    fn store_to(self, values: &mut [i32]);
     /// The entries of a table, as [`Lanes::gather`].
     fn gather(table: &[u32], index: Self) -> Self;
     /// `self` where it is less, else `other`, both without a sign.

@@ -129,6 +129,10 @@ impl Ints for Wrapping<u32> {
         row[0] = self.0;
     }
     #[inline(always)]
+    fn store_to(self, values: &mut [i32]) {
+        values[0] = self.0.cast_signed();
+    }
+    #[inline(always)]
     fn gather(table: &[u32], index: Self) -> Self {
         Self(table[index.0.min(last_of(table)) as usize])
     }

@@ -32,9 +32,17 @@ impl Placing<'_> {
 /// Corners of a run, with room for those of another.
 #[derive(Debug, Default)]
 pub(super) struct Corners {
-    pub(super) corners: Vec<Corner>,
-    /// Of each.
+    corners: Vec<[i32; 2]>,
+    /// Of each; those beyond the run's mean nothing.
     pub(super) reaches: Vec<Reach>,
+}
+
+impl Corners {
+    #[inline]
+    pub(super) fn corner(&self, place: usize) -> Corner {
+        let [x, y] = self.corners[place];
+        Corner { x, y }
+    }
 }
 
 /// Places positions on the grid.
@@ -62,9 +70,10 @@ impl Task for PlaceCorners<'_> {
         let (before, after) = (wide(limits.near.next_down()), wide(limits.far.next_up()));
         let endless = wide(f64::INFINITY);
         let Corners { corners, reaches } = self.to;
-        if corners.len() < self.positions.len() {
-            corners.resize(self.positions.len(), Corner::default());
-            reaches.resize(self.positions.len(), Reach::default());
+        let room = self.positions.len().next_multiple_of(F::WIDTH);
+        if corners.len() < room {
+            corners.resize(room, [0; 2]);
+            reaches.resize(room, Reach::default());
         }
         let runs = self.positions.chunks(F::WIDTH);
         let to = corners.chunks_mut(F::WIDTH);
@@ -94,21 +103,27 @@ impl Task for PlaceCorners<'_> {
                 & !reach.lt(y.abs())
                 & y.abs().lt(endless);
             let scale = wide(grid.scale()) / w;
-            let x = axes[0].along((x * scale).to_nearest());
-            let y = axes[1].along((y * scale).to_nearest());
-            for (lane, corner) in corners.iter_mut().enumerate().take(positions.len()) {
-                let [x, first_x, last_x] = [x[0][lane], x[1][lane], x[2][lane]];
-                let [y, first_y, last_y] = [y[0][lane], y[1][lane], y[2][lane]];
-                corner.x = x.cast_signed();
-                corner.y = y.cast_signed();
-                reaches[lane] = [first_x, first_y, last_x, last_y].map(u32::cast_signed);
-            }
+            let [x, first_x, last_x] = axes[0].along((x * scale).to_nearest());
+            let [y, first_y, last_y] = axes[1].along((y * scale).to_nearest());
+            store::<F>(&x.interleave(y), corners.as_flattened_mut());
+            let (x, y) = (first_x.interleave(last_x), first_y.interleave(last_y));
+            let ([a, b], [c, d]) = (x[0].interleave(y[0]), x[1].interleave(y[1]));
+            store::<F>(&[a, b, c, d], reaches.as_flattened_mut());
             for lane in (!inside).lanes().take_while(|lane| *lane < positions.len()) {
                 let place = self.placing.place(positions[lane]);
-                corners[lane] = Corner::outside(limits.beyond(&place));
+                let Corner { x, y } = Corner::outside(limits.beyond(&place));
+                corners[lane] = [x, y];
                 reaches[lane] = Grid::EVERYWHERE;
             }
         }
+    }
+}
+
+/// The integers of these bits, one after another.
+#[inline(always)]
+fn store<F: Lanes>(lanes: &[F], values: &mut [i32]) {
+    for (i, lanes) in lanes.iter().enumerate() {
+        lanes.to_bits().store_to(&mut values[i * F::WIDTH..]);
     }
 }
 
@@ -135,18 +150,16 @@ impl<F: Lanes> Axis<F> {
         }
     }
 
-    /// The coordinates of corners by those on the picture's grid, and the two of their reach.
+    /// The coordinates of corners by those on the picture's grid, and the two of their reach, as bits.
     #[inline(always)]
-    fn along(&self, coordinate: F::Int) -> [<F::Int as Ints>::Row; 3] {
+    fn along(&self, coordinate: F::Int) -> [F; 3] {
         let zero = F::Int::splat(0);
         let own = coordinate - self.origin;
         let first = (own + self.to_first) & self.whole;
         let last = (own + self.to_last) & self.whole;
-        let mut rows = [F::Int::ROW; 3];
-        own.store(&mut rows[0]);
-        F::Int::select(first.lt(zero), zero, first).store(&mut rows[1]);
-        (zero - F::Int::select(self.last.lt(last), self.last, last)).store(&mut rows[2]);
-        rows
+        let first = F::Int::select(first.lt(zero), zero, first);
+        let last = zero - F::Int::select(self.last.lt(last), self.last, last);
+        [own.from_bits(), first.from_bits(), last.from_bits()]
     }
 }
 
@@ -236,7 +249,9 @@ mod tests {
                     positions: &positions,
                     to: &mut corners,
                 });
-                let found = (corners.corners, corners.reaches);
+                let places = 0..positions.len();
+                let found = places.map(|place| (corners.corner(place), corners.reaches[place]));
+                let found: (Vec<Corner>, Vec<Reach>) = found.unzip();
                 assert_eq!(found, expected, "{plugin} {}", kernel.name());
             }
         }

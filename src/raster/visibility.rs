@@ -234,7 +234,7 @@ impl Stage {
             Some(first) => triangles[place as usize].map(|i| i - first),
             None => self.triangles[place as usize],
         };
-        triangle.map(|i| self.corners.corners[i as usize])
+        triangle.map(|i| self.corners.corner(i as usize))
     }
 }
 

@@ -277,6 +277,12 @@ impl Ints for U32x8 {
         unsafe { _mm256_storeu_si256(row.as_mut_ptr().cast(), self.0) }
     }
     #[inline(always)]
+    fn store_to(self, values: &mut [i32]) {
+        let values = &mut values[..8];
+        // SAFETY: see the module; there are as many integers.
+        unsafe { _mm256_storeu_si256(values.as_mut_ptr().cast(), self.0) }
+    }
+    #[inline(always)]
     fn gather(table: &[u32], index: Self) -> Self {
         let index = index.min(Self::splat(last_of(table)));
         // SAFETY: see the module; no index is beyond the table, or read as one below 0.

@@ -134,7 +134,7 @@ fn what_parts_lose_of_a_material_is_told() {
     let path = folder.path().join("a.obj");
     std::fs::write(
         &path,
-        "mtllib a.mtl\nusemtl red\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
+        "mtllib a.mtl\nusemtl red\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/1\n",
     )
     .unwrap();
     for (material, told) in [
